@@ -74,6 +74,13 @@ typedef struct cav_law {
 } cav_law;
 cav_law cav_law_at(const cav_state *state, const cav_softness *softness, double x, double weight);
 
+/// rho = R_j mu_j^2, the same for all friction rows of a contact; 0 if none has friction.
+static inline double cav_friction_regulariser(int dim, const double *R, const double *friction) {
+  for (int j = 1; j < dim; j++)
+    if (friction[j - 1] > 0.0) return R[j] * friction[j - 1] * friction[j - 1];
+  return 0.0;
+}
+
 /// What rows of friction add to h B: 1 in the step after which nothing moves, where they feel the velocity before it as they
 /// do that after any other step: what friction holds creeps, and would be let go by a step that ends that.
 static inline double cav_friction_stops(const cav_state *state) { return state->options.stops ? 1 : 0; }

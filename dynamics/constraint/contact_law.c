@@ -145,13 +145,6 @@ static void fill_hessian(int dim, double normal_R, double rho, const double *fri
   }
 }
 
-// rho of the friction rows, 0 if all are without friction.
-static double friction_regulariser(int dim, const double *R, const double *friction) {
-  for (int j = 1; j < dim; j++)
-    if (friction[j - 1] > 0.0) return R[j] * friction[j - 1] * friction[j - 1];
-  return 0.0;
-}
-
 // the law for g of ordinary size.
 static void ordinary_cone(int dim, const double *R, const double *friction, double sigma, int ends, const double *g,
                           double *f, double *hessian, double *potential) {
@@ -161,7 +154,7 @@ static void ordinary_cone(int dim, const double *R, const double *friction, doub
     direction[j - 1] = friction[j - 1] > 0.0 ? g[j] / friction[j - 1] : 0.0;
     square += direction[j - 1] * direction[j - 1];
   }
-  const double rho = friction_regulariser(dim, R, friction), root = sqrt(R[0]), norm = sqrt(square);
+  const double rho = cav_friction_regulariser(dim, R, friction), root = sqrt(R[0]), norm = sqrt(square);
   const double tangent = sqrt(rho / R[0]), length = sqrt(rho) * norm;
   // without friction the cone is a ray and only the normal matters
   if (!(tangent > 0.0)) {

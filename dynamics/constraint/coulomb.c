@@ -65,13 +65,6 @@ static double normalise(int n, double *h) {
   return most * root;
 }
 
-// R_j mu_j^2, the same for all friction rows; 0 if none has friction
-static double friction_regulariser(int dim, const double *R, const double *friction) {
-  for (int j = 1; j < dim; j++)
-    if (friction[j - 1] > 0.0) return R[j] * friction[j - 1] * friction[j - 1];
-  return 0.0;
-}
-
 void cav_law_coulomb(int dim, const double *R, const double *friction, double sigma, int ends, const double *held,
                      const double *g, double *f, double *hessian, double *potential) {
   double h[DIM_MAX - 1] = {0.0}, curvature;
@@ -79,7 +72,7 @@ void cav_law_coulomb(int dim, const double *R, const double *friction, double si
   for (int i = 1; hessian && i < dim * dim; i++) hessian[i] = 0.0;
   for (int j = 1; j < dim; j++) f[j] = 0.0;
   if (hessian) hessian[0] = curvature;
-  const double rho = friction_regulariser(dim, R, friction);
+  const double rho = cav_friction_regulariser(dim, R, friction);
   if (!(rho > 0.0)) return;
   // where the law has ended there is no friction to find
   if (ends && !held && f[0] == 0.0) return;

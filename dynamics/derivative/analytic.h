@@ -18,15 +18,9 @@ typedef struct cav_derivative_task {
   double *dq, *dv, *dn; ///< [nv*nv]
 } cav_derivative_task;
 
-// last dof that moves a link, -1 for the world
-static inline int last_dof(const cav_model *model, int link) {
-  while (link > 0 && model->link[link].ndof == 0) link = model->link[link].parent;
-  return link > 0 ? model->link[link].dof + model->link[link].ndof - 1 : -1;
-}
-
 // last dof that moves both of two links, -1 if there is none
 static inline int common_dof(const cav_model *model, const int link[2]) {
-  int a = last_dof(model, link[0]), b = last_dof(model, link[1]);
+  int a = cav_last_dof(model, link[0]), b = cav_last_dof(model, link[1]);
   while (a != b) {
     if (a > b)
       a = model->dof[a].parent;

@@ -29,8 +29,6 @@ static const double THIN = 1e-7;
 // fraction of the curvature of a contact that pushes below which there is none
 static const double FLAT = 1e-13;
 
-static int is_curved(const cav_shape *s) { return s->type == CAV_GEOM_ELLIPSOID || s->type == CAV_GEOM_CYLINDER; }
-
 static void place(const cav_model *model, const cav_state *state, int index, cav_shape *shape) {
   const cav_geom *geom = &model->geom[index];
   const cav_pose *link = &state->link[geom->link];
@@ -160,7 +158,7 @@ static int solve_two(const double a[2], const double b[2], const double r[2], do
 static int find_parts(const cav_contact *c, const cav_shape *a, const cav_shape *b, double size, cav_separation *s,
                       parts *p) {
   cav_core ca = cav_core_of(a), cb = cav_core_of(b);
-  int curved = is_curved(a);
+  int curved = cav_shape_is_curved(a);
   *p = (parts){.n = 0};
   if (!curved) {
     double most = c->dist + ca.radius + cb.radius + size;
@@ -220,7 +218,7 @@ static int nearest_points(const cav_contact *c, const cav_shape *a, const cav_sh
   for (int i = 0; i < p.n; i++) {
     for (int k = 0; k < 2; k++) row[i][k] = dot3(p.along[i], t[k]);
   }
-  if (is_curved(a)) cav_shape_bend(a, s.n, t, H);
+  if (cav_shape_is_curved(a)) cav_shape_bend(a, s.n, t, H);
   for (int i = 0; i < 2; i++) {
     for (int k = 0; k < 2; k++) G[i][k] = H[i][k] + (i == k) * s.gap;
   }

@@ -174,7 +174,7 @@ CAV_VECTOR_BODY void between_columns_body(const cav_derivative_task *t, const ca
       held[i] = sign * DOT6(L + 6 * i, axis);
     }
     S = b->axes[!side];
-    for (int row = last_dof(t->model, b->link[!side]); row != b->common; row = t->model->dof[row].parent, S += 6) {
+    for (int row = cav_last_dof(t->model, b->link[!side]); row != b->common; row = t->model->dof[row].parent, S += 6) {
       cav_four q = on * DOT6(S, dq), push = DOT6(S, next) * on, before = stops ? DOT6(S, held) * on : keep * push;
       add_columns(t, row, k, end, &q, &push, &before);
     }
@@ -187,7 +187,7 @@ CAV_VECTOR_BODY void between_columns_body(const cav_derivative_task *t, const ca
     }
     for (int i = 0; i < 6; i++) own[i] = dq[i] - carried[i];
     S = b->axes[side];
-    for (int row = last_dof(t->model, b->link[side]); row != b->common; row = t->model->dof[row].parent, S += 6) {
+    for (int row = cav_last_dof(t->model, b->link[side]); row != b->common; row = t->model->dof[row].parent, S += 6) {
       cav_four q = -(on * DOT6(S, own)), push = -(DOT6(S, next) * on);
       cav_four before = stops ? -(DOT6(S, held) * on) : keep * push;
       add_columns(t, row, k, end, &q, &push, &before);
@@ -211,14 +211,14 @@ static void contact_between(const cav_derivative_task *t, const cav_contact *c,
   between b = {.link = {c->link1, c->link2}};
   b.common = common_dof(t->model, b.link);
   b.axes[0] = t->s->across;
-  b.axes[1] = b.axes[0] + 6 * axes_about(t, c, last_dof(t->model, c->link1), b.common, b.axes[0]);
-  b.shared = b.axes[1] + 6 * axes_about(t, c, last_dof(t->model, c->link2), b.common, b.axes[1]);
+  b.axes[1] = b.axes[0] + 6 * axes_about(t, c, cav_last_dof(t->model, c->link1), b.common, b.axes[0]);
+  b.shared = b.axes[1] + 6 * axes_about(t, c, cav_last_dof(t->model, c->link2), b.common, b.axes[1]);
   if (b.common >= 0) {
     axes_about(t, c, b.common, -1, b.shared);
     add_impulse(c, b.whole);
   }
   for (int side = 0; side < 2; side++) {
-    int last = last_dof(t->model, b.link[side]), first = b.common < 0 ? 0 : t->s->depth[b.common] + 1;
+    int last = cav_last_dof(t->model, b.link[side]), first = b.common < 0 ? 0 : t->s->depth[b.common] + 1;
     double d[3];
     if (last == b.common) continue;
     sub3(d, c->pos, t->state->reference + 3 * b.link[side]);
@@ -327,7 +327,7 @@ static void add_path_rows(const cav_derivative_task *t, int rows, int length, co
 // what the dofs that move one link of a contact do
 static void add_side(const cav_derivative_task *t, const cav_contact *c, const cav_contact_jacobian *derivative,
                      int side, cav_contact_derivative *out) {
-  int link = side ? c->link2 : c->link1, last = last_dof(t->model, link), n = t->s->path.stride;
+  int link = side ? c->link2 : c->link1, last = cav_last_dof(t->model, link), n = t->s->path.stride;
   double *row = t->s->entry, d[3];
   if (last < 0) return;
   int length = cav_derivative_path(t, last);

@@ -123,11 +123,6 @@ typedef struct link_equality {
   double force[3], moment[3];     ///< on the first link
 } link_equality;
 
-static int last_dof(const cav_model *model, int link) {
-  while (link > 0 && model->link[link].ndof == 0) link = model->link[link].parent;
-  return link > 0 ? model->link[link].dof + model->link[link].ndof - 1 : -1;
-}
-
 // world force and moment of an impulse under a matrix of the rotation rows
 static void add_push(const link_equality *l, const double *turn, const double *impulse, double moment[3]) {
   double part[3];
@@ -185,7 +180,7 @@ static void push_rows(const task *t, const link_equality *l, int j, const double
   double inverse_h = 1 / t->state->options.timestep;
   for (int a = 0; a < 2; a++) {
     double scale = a ? inverse_h : -inverse_h;
-    for (int k = last_dof(t->model, l->e->link[a]); k >= 0; k = t->model->dof[k].parent) {
+    for (int k = cav_last_dof(t->model, l->e->link[a]); k >= 0; k = t->model->dof[k].parent) {
       double S[6];
       motion_at(S, t->state->axis + 6 * k, t->state->reference + 3 * t->model->dof[k].link, l->equality->point[a]);
       out[k * t->nv + j] += scale * dot6(S, wrench[a]);
@@ -361,7 +356,7 @@ void cav_equality_derivatives(const cav_model *model, const cav_state *state, do
     link_equality l;
     open_equality(&t, eq, &l);
     for (int side = 0; side < 2; side++) {
-      for (int j = last_dof(model, e->link[side]); j >= 0; j = model->dof[j].parent) link_column(&t, &l, side, j);
+      for (int j = cav_last_dof(model, e->link[side]); j >= 0; j = model->dof[j].parent) link_column(&t, &l, side, j);
     }
   }
 }

@@ -72,10 +72,10 @@ static void add_buoyancy(const cav_derivative_task *t) {
     double force[3];
     cav_mass_pose(t->state, body, &pose);
     scale3(force, body->buoyancy * body->mass, t->model->gravity);
-    for (int j = last_dof(t->model, body->link); j >= 0; j = w->parent[j]) {
+    for (int j = cav_last_dof(t->model, body->link); j >= 0; j = w->parent[j]) {
       double back[3], S[6];
       cross3(back, force, t->state->axis + 6 * j);
-      for (int k = last_dof(t->model, body->link); k >= 0; k = w->parent[k]) {
+      for (int k = cav_last_dof(t->model, body->link); k >= 0; k = w->parent[k]) {
         motion_at(S, t->state->axis + 6 * k, reference, pose.pos);
         t->dq[k * t->nv + j] += dot3(S + 3, back);
       }
@@ -88,7 +88,7 @@ static void leave_to_actuators(const cav_derivative_task *t) {
   const cav_workspace *w = t->state->work;
   if (!t->state->options.passive || !t->state->options.gravity) return;
   for (int i = 0; i < w->nbuoy; i++) {
-    int link = t->model->body[w->buoy[i]].link, last = last_dof(t->model, link);
+    int link = t->model->body[w->buoy[i]].link, last = cav_last_dof(t->model, link);
     const double *reference = t->state->reference + 3 * link;
     double point[3], force[3], S[2][6], rate[3];
     cav_buoyancy(t->model, t->state, w->buoy[i], point, force);

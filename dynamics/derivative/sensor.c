@@ -24,11 +24,6 @@ static void put3(double *out, int nv, int column, const double x[3]) {
   for (int i = 0; i < 3; i++) put(out, nv, i, column, x[i]);
 }
 
-static int last_dof(const cav_model *model, int link) {
-  while (link > 0 && model->link[link].ndof == 0) link = model->link[link].parent;
-  return link > 0 ? model->link[link].dof + model->link[link].ndof - 1 : -1;
-}
-
 // change of the velocity of a link by a dof, about a point fixed in space; S, drift and V about that point
 static void velocity_rate(double r[6], const double S[6], const double drift[6], const double V[6]) {
   double carried[6] = {0};
@@ -79,8 +74,10 @@ static void referred_pose(const task *t, const cav_sensor *sensor) {
   int base = cav_object_link(t->model, sensor->reference_type, sensor->reference);
   cav_object_pose(t->model, t->state, sensor->object_type, sensor->object, &pose);
   cav_object_pose(t->model, t->state, sensor->reference_type, sensor->reference, &from);
-  for (int j = last_dof(t->model, link); j >= 0; j = t->model->dof[j].parent) add_pose(t, sensor, &pose, &from, 1, j);
-  for (int j = last_dof(t->model, base); j >= 0; j = t->model->dof[j].parent) add_pose(t, sensor, &pose, &from, -1, j);
+  for (int j = cav_last_dof(t->model, link); j >= 0; j = t->model->dof[j].parent)
+    add_pose(t, sensor, &pose, &from, 1, j);
+  for (int j = cav_last_dof(t->model, base); j >= 0; j = t->model->dof[j].parent)
+    add_pose(t, sensor, &pose, &from, -1, j);
 }
 
 // one column of the derivatives of a frame's reading
@@ -131,7 +128,7 @@ static void frame(const task *t, const cav_sensor *sensor, cav_object_type type)
   double V[6];
   cav_object_pose(t->model, t->state, type, sensor->object, &pose);
   motion_at(V, t->state->velocity_next + 6 * link, t->state->reference + 3 * link, pose.pos);
-  for (int j = last_dof(t->model, link); j >= 0; j = t->model->dof[j].parent) frame_column(t, sensor, &pose, V, j);
+  for (int j = cav_last_dof(t->model, link); j >= 0; j = t->model->dof[j].parent) frame_column(t, sensor, &pose, V, j);
 }
 
 /// A body of a subtree.
@@ -219,7 +216,7 @@ static void subtree(const task *t, const cav_sensor *sensor) {
   part p;
   for (int i = sensor->object; i < t->model->nbody; i++) {
     if (!subtree_part(t, i, sensor->object, &p)) continue;
-    for (int j = last_dof(t->model, p.body->link); j >= 0; j = t->model->dof[j].parent) {
+    for (int j = cav_last_dof(t->model, p.body->link); j >= 0; j = t->model->dof[j].parent) {
       body_column(t, sensor, &p, &s, j);
     }
   }

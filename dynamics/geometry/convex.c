@@ -55,8 +55,6 @@ typedef struct search {
   candidate best;
 } search;
 
-static int is_curved(const cav_shape *s) { return s->type == CAV_GEOM_ELLIPSOID || s->type == CAV_GEOM_CYLINDER; }
-
 // --- features about a direction ---
 
 static void add_cylinder(const cav_shape *s, const double n[3], feature *f, int *count) {
@@ -393,7 +391,7 @@ static void note_features(const search *g, const feature *fa, const feature *fb,
                           cav_separation *out) {
   double t[2][3];
   out->straight = fa->straight;
-  out->corners = is_curved(g->b) ? 0 : fb->corners;
+  out->corners = cav_shape_is_curved(g->b) ? 0 : fb->corners;
   for (int k = 0; k < out->corners && k < 2; k++) copy3(out->corner_b[k], fb->x[k]);
   if (out->corners < 3) return;
   tangents(n, NULL, t);
@@ -540,18 +538,19 @@ static int ask_libccd(const cav_core *a, const cav_core *b, double size, double 
 #endif
 
 int cav_separation_solve(const cav_shape *a, const cav_shape *b, double margin, cav_hint *hint, cav_separation *out) {
-  int swap = !is_curved(a) && is_curved(b);
+  int swap = !cav_shape_is_curved(a) && cav_shape_is_curved(b);
   search g = {.a = swap ? b : a, .b = swap ? a : b, .size = fmax(cav_shape_size(a), cav_shape_size(b))};
   cav_core ca = cav_core_of(g.a), cb = cav_core_of(g.b);
   g.core = &cb;
   g.meets = MEETS;
   double most = margin + ca.radius + cb.radius;
-  if (!is_curved(g.a) && !hint) return cav_separation_find(&ca, &cb, g.size, most, out);
+  if (!cav_shape_is_curved(g.a) && !hint) return cav_separation_find(&ca, &cb, g.size, most, out);
   // of many corners those near a rough direction are too many to try: first the exact one, then the few about it
-  int many = cav_shape_corners(g.b) > NEAR_MAX, proven = 0, again = hint && (!is_curved(g.a) || (many && !swap));
+  int many = cav_shape_corners(g.b) > NEAR_MAX, proven = 0,
+      again = hint && (!cav_shape_is_curved(g.a) || (many && !swap));
   if (again) {
     int found = cav_separation_again(&ca, &cb, g.size, most, hint, out);
-    if (!found || hint->na || !is_curved(g.a)) return found;
+    if (!found || hint->na || !cav_shape_is_curved(g.a)) return found;
   }
 #ifdef CAVORT_HAVE_CCD
   double n[3];

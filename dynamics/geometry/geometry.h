@@ -38,6 +38,11 @@ static inline cav_shape cav_shape_of(const cav_model *model, const cav_geom *geo
   return shape;
 }
 
+/// Whether it is an ellipsoid or a cylinder, which no corners describe.
+static inline int cav_shape_is_curved(const cav_shape *shape) {
+  return shape->type == CAV_GEOM_ELLIPSOID || shape->type == CAV_GEOM_CYLINDER;
+}
+
 /// All contact points of two shapes with dist < margin; a->type <= b->type, in the order of their features. Returns
 /// their number, at most CAV_TOUCH_MAX. pairs.c: table over types; exact routines where they exist, polytope.c for the
 /// rest.

@@ -89,10 +89,6 @@ static vertex support_near(const bodies *g, const double d[3], int near_a, int n
 
 static vertex support(const bodies *g, const double d[3]) { return support_near(g, d, -1, -1); }
 
-static int is_curved(const cav_core *c) {
-  return c->shape->type == CAV_GEOM_ELLIPSOID || c->shape->type == CAV_GEOM_CYLINDER;
-}
-
 // --- nearest point of a simplex ---
 
 /// A simplex about its last point: products of the edges to the others, and of these with the way to the origin.
@@ -231,7 +227,8 @@ static vertex corners_of(const bodies *g, int a, int b) {
 // where a walk begins: at what met last, or else at what is furthest along a direction
 static void begin(const bodies *g, const cav_hint *from, simplex *s, double v[3]) {
   double d[3];
-  int corners = from && !from->apart && !is_curved(g->a) ? (from->na > from->nb ? from->na : from->nb) : 0;
+  int corners =
+      from && !from->apart && !cav_shape_is_curved(g->a->shape) ? (from->na > from->nb ? from->na : from->nb) : 0;
   s->n = 1;
   s->weight[0] = 1;
   if (corners) {
@@ -523,7 +520,7 @@ static int conclude(const bodies *g, double most, outcome end, const simplex *s,
 }
 
 int cav_separation_find(const cav_core *a, const cav_core *b, double size, double most, cav_separation *out) {
-  bodies g = {a, b, size, is_curved(a) || is_curved(b) ? CURVED_CLOSE : CLOSE, 0};
+  bodies g = {a, b, size, cav_shape_is_curved(a->shape) || cav_shape_is_curved(b->shape) ? CURVED_CLOSE : CLOSE, 0};
   simplex s;
   cav_separation found;
   double d[3];
@@ -584,7 +581,7 @@ static int is_settled(const bodies *g, outcome end, const simplex *s, const doub
 
 int cav_separation_again(const cav_core *a, const cav_core *b, double size, double most, cav_hint *hint,
                          cav_separation *out) {
-  const int curved = is_curved(a);
+  const int curved = cav_shape_is_curved(a->shape);
   bodies g = {a, b, size, curved ? ROUGH : CLOSE, SLACK * size};
   simplex s;
   cav_separation found;

@@ -105,8 +105,6 @@ static int from_edges(double p[3][3], double q[3][3], double x[3], double y[3], 
   return 1;
 }
 
-static int is_curved(const cav_shape *s) { return s->type == CAV_GEOM_ELLIPSOID || s->type == CAV_GEOM_CYLINDER; }
-
 // a curved body and a corner q
 static int curved_corner(const cav_shape *a, const double q[3], double x[3], double n[3], int *straight) {
   double d[3], local[3], normal[3];
@@ -268,7 +266,7 @@ static int on_level(const double p[3], const cav_shape *s, const double towards[
 
 int cav_nearest_prove(const cav_core *a, const cav_core *b, double size, const cav_hint *hint, cav_separation *out) {
   double p[3][3], q[3][3], n[3], x[3], y[3], d[3], back[3];
-  const int na = hint->na, nb = hint->nb, curved = is_curved(a->shape);
+  const int na = hint->na, nb = hint->nb, curved = cav_shape_is_curved(a->shape);
   int straight = 0;
   if (na < 1 || nb < 1 || (na > 1 && nb > 1 && na + nb > 4)) return 0;
   for (int i = 0; i < na && !curved; i++) cav_shape_corner(a->shape, hint->a[i], p[i]);

@@ -15,8 +15,6 @@ typedef struct writer {
   int *element; ///< [nbody] of the draft
 } writer;
 
-static int is(const cav_xml_node *node, const char *name) { return !strcmp(node->rule->name, name); }
-
 static int same(const double *a, const double *b, int n) { return !memcmp(a, b, (size_t)n * sizeof *a); }
 
 // numbers that are not what MJCF takes where nothing is said
@@ -143,15 +141,15 @@ static void write_site(const writer *w, const cav_site *s) {
 static int is_left_out(const cav_xml_node *node, const char *name, int actuators) {
   if (!strcmp(name, "material")) return 1;
   int adds = !strcmp(name, "armature") || !strcmp(name, "damping");
-  return adds && actuators && !is(node, "tendon") && !is(node, "fixed") && !is(node, "spatial");
+  return adds && actuators && !cav_xml_is(node, "tendon") && !cav_xml_is(node, "fixed") && !cav_xml_is(node, "spatial");
 }
 
 // an element and all that it holds, as the file has it; classes of what is written in full are not needed
 static int copy_node(const writer *w, const cav_xml_node *node, int parent, int actuators) {
   static const char *const full[] = {"geom", "joint", "site", "mesh", "material", "camera", "light"};
-  if (node->parent && is(node->parent, "default")) {
+  if (node->parent && cav_xml_is(node->parent, "default")) {
     for (size_t i = 0; i < sizeof full / sizeof *full; i++)
-      if (is(node, full[i])) return -1;
+      if (cav_xml_is(node, full[i])) return -1;
   }
   int at = cav_draft_add(w->draft, parent, node->rule->name);
   for (int i = 0; i < node->nvalue; i++) {
@@ -177,9 +175,9 @@ static void copy_sections(const writer *w, const cav_xml_node *root) {
   int count = 0;
   for (const cav_xml_node *c = root->child; c; c = c->next) {
     for (size_t i = 0; i < sizeof sections / sizeof *sections; i++)
-      if (is(c, sections[i])) copy_node(w, c, CAV_DRAFT_ROOT, is(c, "default"));
-    if (is(c, "actuator")) copy_actuators(w, c, &count);
-    const cav_xml_value *limits = is(c, "compiler") ? cav_xml_get(c, "autolimits") : NULL;
+      if (cav_xml_is(c, sections[i])) copy_node(w, c, CAV_DRAFT_ROOT, cav_xml_is(c, "default"));
+    if (cav_xml_is(c, "actuator")) copy_actuators(w, c, &count);
+    const cav_xml_value *limits = cav_xml_is(c, "compiler") ? cav_xml_get(c, "autolimits") : NULL;
     if (limits)
       cav_draft_text(w->draft, cav_draft_add(w->draft, CAV_DRAFT_ROOT, "compiler"), "autolimits", limits->text);
   }
@@ -189,7 +187,8 @@ static void write_keys(const writer *w, const cav_xml_node *root) {
   const cav_model *m = w->model;
   int section = m->nkey ? cav_draft_add(w->draft, CAV_DRAFT_ROOT, "keyframe") : -1, k = 0;
   for (const cav_xml_node *c = root->child; c; c = c->next) {
-    for (const cav_xml_node *key = is(c, "keyframe") ? c->child : NULL; key && k < m->nkey; key = key->next, k++) {
+    for (const cav_xml_node *key = cav_xml_is(c, "keyframe") ? c->child : NULL; key && k < m->nkey;
+         key = key->next, k++) {
       int at = cav_draft_add(w->draft, section, "key");
       put_name(w, at, m->key[k].name);
       put_one(w, at, "time", m->key[k].time, 0);
@@ -223,7 +222,7 @@ static cav_status check(const cav_model *m, const cav_xml_node *node, cav_error 
       return cav_xml_fail_as(error, CAV_NOT_SUPPORTED, node, NULL,
                              "models with meshes or height fields are not written");
   for (size_t i = 0; i < sizeof copies / sizeof *copies; i++)
-    if (is(node, copies[i]))
+    if (cav_xml_is(node, copies[i]))
       return cav_xml_fail_as(error, CAV_NOT_SUPPORTED, node, NULL, "is not written; write the bodies out");
   for (const cav_xml_node *c = node->child; c; c = c->next) {
     cav_status status = check(m, c, error);

@@ -5,13 +5,7 @@
 /// limits of effort, which become limits of the force of each. Not offered: adhesion, user-defined functions.
 
 #include "math3.h"
-#include "spec.h"
-
-static int is(const cav_xml_node *node, const char *name) { return !strcmp(node->rule->name, name); }
-
-static void read_real(const cav_xml_node *node, const char *name, double *out) {
-  *out = cav_xml_real(node, name, *out);
-}
+#include "mjcf.h"
 
 // only the values that are given replace those there
 static void imply(cav_spec_actuator *a, int activation, int gain, int bias) {
@@ -35,7 +29,7 @@ static void read_general(const cav_xml_node *node, cav_spec_actuator *a) {
 
 // pull towards a position: kp, and kv or the ratio of damping it should have, which is kept with the other sign
 static void read_servo(const cav_xml_node *node, cav_spec_actuator *a) {
-  int integrates = is(node, "intvelocity"), filters = a->activation == CAV_ACTIVATION_FILTER;
+  int integrates = cav_xml_is(node, "intvelocity"), filters = a->activation == CAV_ACTIVATION_FILTER;
   double damping = a->biasprm[2];
   imply(a, integrates ? CAV_ACTIVATION_INTEGRATOR : CAV_ACTIVATION_NONE, CAV_GAIN_FIXED, CAV_BIAS_AFFINE);
   read_real(node, "kp", &a->gainprm[0]);
@@ -94,31 +88,31 @@ void cav_actuator_read_values(const cav_xml_node *node, cav_spec_actuator *a) {
   read_real(node, "armature", &a->armature);
   cav_xml_reals(node, "damping", a->damping, 3);
   a->group = cav_xml_int(node, "group", a->group);
-  if (is(node, "general")) {
+  if (cav_xml_is(node, "general")) {
     read_general(node, a);
-  } else if (is(node, "motor")) {
+  } else if (cav_xml_is(node, "motor")) {
     imply(a, CAV_ACTIVATION_NONE, CAV_GAIN_FIXED, CAV_BIAS_NONE);
     a->gainprm[0] = 1;
-  } else if (is(node, "position") || is(node, "intvelocity")) {
+  } else if (cav_xml_is(node, "position") || cav_xml_is(node, "intvelocity")) {
     read_servo(node, a);
-  } else if (is(node, "velocity")) {
+  } else if (cav_xml_is(node, "velocity")) {
     imply(a, CAV_ACTIVATION_NONE, CAV_GAIN_FIXED, CAV_BIAS_AFFINE);
     read_real(node, "kv", &a->gainprm[0]);
     a->biasprm[2] = -a->gainprm[0];
-  } else if (is(node, "damper")) {
+  } else if (cav_xml_is(node, "damper")) {
     imply(a, CAV_ACTIVATION_NONE, CAV_GAIN_AFFINE, CAV_BIAS_NONE);
     memset(a->gainprm, 0, sizeof a->gainprm);
     a->gainprm[2] = -cav_xml_real(node, "kv", 0);
-  } else if (is(node, "cylinder")) {
+  } else if (cav_xml_is(node, "cylinder")) {
     read_cylinder(node, a);
-  } else if (is(node, "muscle")) {
+  } else if (cav_xml_is(node, "muscle")) {
     read_muscle(node, a);
   }
 }
 
 void cav_actuator_read(cav_spec *spec, const cav_xml_node *node, cav_spec_actuator *a) {
   cav_actuator_read_values(node, a);
-  if (!is(node, "position") && !is(node, "intvelocity")) a->inherit = 0;
+  if (!cav_xml_is(node, "position") && !cav_xml_is(node, "intvelocity")) a->inherit = 0;
   if (a->activation > CAV_ACTIVATION_MUSCLE || a->gain > CAV_GAIN_MUSCLE || a->bias > CAV_BIAS_MUSCLE)
     cav_spec_lack(spec, node, NULL, "user-defined functions are not supported; use one of the other types");
   if (cav_xml_accepts(node, "kv") && cav_xml_accepts(node, "dampratio") && cav_xml_get(node, "kv") &&

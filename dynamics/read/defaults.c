@@ -30,7 +30,7 @@ void cav_mjcf_read_compiler(cav_mjcf_reader *r, const cav_xml_node *node) {
   if (cav_xml_word(node, "coordinate", 0) == 1)
     cav_spec_fail(r->spec, node, "coordinate", "global coordinates are not supported; write local ones");
   for (const cav_xml_node *i = node->child; i; i = i->next) {
-    if (node_is(i, "lengthrange"))
+    if (cav_xml_is(i, "lengthrange"))
       cav_spec_warn(r->spec, i, NULL, "left aside: lengths of muscles are found over the ranges of the joints");
   }
   c->fuse = cav_xml_bool(node, "fusestatic", c->fuse);
@@ -107,7 +107,7 @@ void cav_mjcf_read_option(cav_mjcf_reader *r, const cav_xml_node *node) {
   if (cav_xml_int(node, "noslip_iterations", 0) > 0)
     cav_spec_warn(spec, node, "noslip_iterations", "left aside: friction is as soft as impratio says");
   for (const cav_xml_node *c = node->child; c; c = c->next) {
-    if (node_is(c, "flag")) read_flags(r, c);
+    if (cav_xml_is(c, "flag")) read_flags(r, c);
   }
 }
 
@@ -290,10 +290,10 @@ static void read_default_values(cav_mjcf_reader *r, const cav_xml_node *node, ca
 // own values of a class first, then its subclasses, which start from them
 static void read_class(cav_mjcf_reader *r, const cav_xml_node *node, int class) {
   for (const cav_xml_node *c = node->child; c; c = c->next) {
-    if (!node_is(c, "default")) read_default_values(r, c, &r->classes.at[class]);
+    if (!cav_xml_is(c, "default")) read_default_values(r, c, &r->classes.at[class]);
   }
   for (const cav_xml_node *c = node->child; c; c = c->next) {
-    if (!node_is(c, "default") || r->spec->status != CAV_OK) continue;
+    if (!cav_xml_is(c, "default") || r->spec->status != CAV_OK) continue;
     const char *name = cav_xml_text(c, "class", NULL);
     if (!name) {
       cav_spec_fail(r->spec, c, "class", "is missing; a class inside another needs a name");
@@ -355,12 +355,12 @@ void cav_mjcf_check_childclass(cav_mjcf_reader *r, const cav_xml_node *node) {
 
 void cav_mjcf_read_assets(cav_mjcf_reader *r, const cav_xml_node *node) {
   for (const cav_xml_node *c = node->child; c; c = c->next) {
-    if (node_is(c, "mesh")) {
+    if (cav_xml_is(c, "mesh")) {
       const cav_mjcf_class *class = cav_mjcf_class_of(r, c, NULL);
       cav_read_mesh(r->spec, c, class->scale, class->inertia, class->hull_vertices);
     }
-    if (node_is(c, "hfield")) cav_read_hfield(r->spec, c);
-    if (!node_is(c, "material")) continue;
+    if (cav_xml_is(c, "hfield")) cav_read_hfield(r->spec, c);
+    if (!cav_xml_is(c, "material")) continue;
     cav_mjcf_material *m = CAV_SPEC_PUSH(r->spec, &r->materials);
     if (!m) return;
     m->name = cav_xml_text(c, "name", "");

@@ -34,8 +34,6 @@ typedef struct expansion {
   int nested; ///< open elements of the worldbody, those around the place of an attachment counted in
 } expansion;
 
-static int is(const cav_xml_node *node, const char *name) { return !strcmp(node->rule->name, name); }
-
 static void no_memory(expansion *e) { cav_spec_no_memory(e->spec); }
 
 // --- names by kind ---
@@ -45,7 +43,7 @@ static const char *kind_of(const cav_xml_node *node) {
   if (!strcmp(section, "tendon")) return "tendon";
   if (!strcmp(section, "actuator")) return "actuator";
   if (!strcmp(section, "sensor") || !strcmp(section, "equality") || !strcmp(section, "contact")) return "other";
-  return is(node, "freejoint") ? "joint" : node->rule->name;
+  return cav_xml_is(node, "freejoint") ? "joint" : node->rule->name;
 }
 
 // kind that an attribute of an element refers to; NULL: it is no reference
@@ -58,7 +56,7 @@ static const char *referred_kind(const cav_xml_node *node, const char *attribute
       {"body2", "body"},         {"tendon", "tendon"}, {"tendon1", "tendon"}, {"tendon2", "tendon"},
       {"actuator", "actuator"},  {"mesh", "mesh"},     {"hfield", "hfield"},  {"material", "material"},
       {"childclass", "default"}, {"class", "default"}};
-  if (is(node, "attach") || is(node, "model")) return NULL;
+  if (cav_xml_is(node, "attach") || cav_xml_is(node, "model")) return NULL;
   int object = !strcmp(attribute, "objname"), reference = !strcmp(attribute, "refname");
   if (object || reference) {
     const cav_xml_value *type = cav_xml_get(node, object ? "objtype" : "reftype");
@@ -143,7 +141,7 @@ static const char *changed_text(expansion *e, const change *c, const char *text)
 // class names change with a part, whose classes are its own; names of elements always; references where they are named
 static int changes(const cav_xml_node *node, const cav_xml_value *value, const change *c) {
   const char *attribute = value->rule->name;
-  if (is(node, "default") && !strcmp(attribute, "class")) return c->part > 0;
+  if (cav_xml_is(node, "default") && !strcmp(attribute, "class")) return c->part > 0;
   if (!strcmp(attribute, "name")) return 1;
   const char *kind = referred_kind(node, attribute);
   if (!kind) return 0;
@@ -241,7 +239,7 @@ static void copy_referring(expansion *e, cav_xml_node *root, const change *c, in
   static const char *const sections[] = {"contact", "equality", "tendon", "actuator", "sensor"};
   for (cav_xml_node *section = root->child; section; section = section->next) {
     int known = 0;
-    for (size_t i = 0; i < sizeof sections / sizeof *sections; i++) known |= is(section, sections[i]);
+    for (size_t i = 0; i < sizeof sections / sizeof *sections; i++) known |= cav_xml_is(section, sections[i]);
     for (cav_xml_node *k = known ? section->child : NULL, *next; k && e->spec->status == CAV_OK; k = next) {
       next = k->next;
       if (!refers(k, c, 0)) continue;
@@ -322,19 +320,10 @@ static void write_out_replicate(expansion *e, cav_xml_node *root, cav_xml_node *
 
 // --- attach ---
 
-static cav_xml_node *find(cav_xml_node *node, const char *kind, const char *name) {
-  for (cav_xml_node *c = node->child; c; c = c->next) {
-    if (is(c, kind) && !strcmp(cav_xml_text(c, "name", ""), name)) return c;
-    cav_xml_node *below = find(c, kind, name);
-    if (below) return below;
-  }
-  return NULL;
-}
-
 static const cav_xml_node *find_asset(const cav_xml_node *root, const char *name) {
   for (const cav_xml_node *s = root->child; s; s = s->next) {
-    for (const cav_xml_node *c = is(s, "asset") ? s->child : NULL; c; c = c->next) {
-      if (is(c, "model") && !strcmp(cav_xml_text(c, "name", ""), name)) return c;
+    for (const cav_xml_node *c = cav_xml_is(s, "asset") ? s->child : NULL; c; c = c->next) {
+      if (cav_xml_is(c, "model") && !strcmp(cav_xml_text(c, "name", ""), name)) return c;
     }
   }
   return NULL;
@@ -377,7 +366,7 @@ static void append_sections(expansion *e, cav_xml_node *root, const cav_xml_node
   static const char *const ordered[] = {"default", "asset", "tendon", "actuator", "contact", "equality", "sensor"};
   for (size_t i = 0; i < sizeof ordered / sizeof *ordered; i++) {
     for (const cav_xml_node *s = other->child; s && e->spec->status == CAV_OK; s = s->next) {
-      if (!is(s, ordered[i])) continue;
+      if (!cav_xml_is(s, ordered[i])) continue;
       cav_xml_node empty = *s;
       empty.child = NULL;
       cav_xml_node *section = i < 2 ? copy_node(e, s, root, c) : copy_node(e, &empty, root, c);
@@ -440,7 +429,7 @@ static void write_out_attach(expansion *e, cav_xml_node *root, cav_xml_node *nod
   names list = {0};
   change c = {.prefix = prefix, .suffix = "", .part = part};
   if (body || frame_name) {
-    picked = find(from, body ? "body" : "frame", body ? body : frame_name);
+    picked = cav_xml_find(from, body ? "body" : "frame", body ? body : frame_name);
     if (!picked)
       cav_spec_fail(spec, node, body ? "body" : "frame", "'%.60s' has no %s '%.60s'", cav_xml_path(other),
                     body ? "body" : "frame", body ? body : frame_name);
@@ -449,16 +438,18 @@ static void write_out_attach(expansion *e, cav_xml_node *root, cav_xml_node *nod
     cav_xml_node *copy = spec->status == CAV_OK ? copy_node(e, picked, frame, &c) : NULL;
     if (copy) put_last(frame, copy);
     for (const cav_xml_node *s = from->child; s; s = s->next)
-      if (is(s, "asset")) collect_names(e, &list, s);
+      if (cav_xml_is(s, "asset")) collect_names(e, &list, s);
   }
   for (const cav_xml_node *s = picked || spec->status != CAV_OK ? NULL : from->child; s; s = s->next) {
-    for (const cav_xml_node *k = is(s, "worldbody") ? s->child : NULL; k && spec->status == CAV_OK; k = k->next) {
+    for (const cav_xml_node *k = cav_xml_is(s, "worldbody") ? s->child : NULL; k && spec->status == CAV_OK;
+         k = k->next) {
       cav_xml_node *copy = copy_node(e, k, frame, &c);
       if (copy) put_last(frame, copy);
     }
   }
   for (const cav_xml_node *s = from->child; s; s = s->next)
-    if (is(s, "keyframe")) cav_spec_leave(spec, node, "model", "left aside: keyframes of a model that is attached");
+    if (cav_xml_is(s, "keyframe"))
+      cav_spec_leave(spec, node, "model", "left aside: keyframes of a model that is attached");
   if (spec->status == CAV_OK) append_sections(e, root, from, &c, &list, !picked);
   if (spec->status == CAV_OK) replace_node(node, frame, frame);
   free(list.at);
@@ -480,7 +471,7 @@ static void expand_all(expansion *e, cav_xml_node *root, cav_xml_node *node, int
     if (e->spec->status != CAV_OK) break;
     if (c->rule == &cav_replicate_element)
       write_out_replicate(e, root, c);
-    else if (is(c, "attach"))
+    else if (cav_xml_is(c, "attach"))
       write_out_attach(e, root, c, depth);
   }
   e->nested--;
@@ -489,7 +480,7 @@ static void expand_all(expansion *e, cav_xml_node *root, cav_xml_node *node, int
 static void expand(expansion *e, cav_xml *xml, int depth) {
   cav_xml_node *root = (cav_xml_node *)cav_xml_root(xml);
   for (cav_xml_node *s = root->child; s && e->spec->status == CAV_OK; s = s->next) {
-    if (is(s, "worldbody")) expand_all(e, root, s, depth);
+    if (cav_xml_is(s, "worldbody")) expand_all(e, root, s, depth);
   }
 }
 

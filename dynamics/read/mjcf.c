@@ -37,7 +37,7 @@ static void read_joint(cav_mjcf_reader *r, const cav_xml_node *node, const place
   cav_spec *spec = r->spec;
   cav_spec_joint *j = CAV_SPEC_PUSH(spec, &spec->joint);
   if (!j) return;
-  if (node_is(node, "freejoint")) {
+  if (cav_xml_is(node, "freejoint")) {
     // free of all defaults, by definition
     *j = cav_mjcf_first_class().joint;
     j->type = CAV_JOINT_FREE;
@@ -119,7 +119,7 @@ static int find_asset(cav_mjcf_reader *r, cav_spec_geom *g) {
 // a shape that a plugin gives has none of its own
 static void check_plugin(cav_spec *spec, const cav_xml_node *node, const char *text) {
   for (const cav_xml_node *c = node->child; c; c = c->next) {
-    if (node_is(c, "plugin")) cav_spec_lack(spec, c, NULL, text);
+    if (cav_xml_is(c, "plugin")) cav_spec_lack(spec, c, NULL, text);
   }
 }
 
@@ -213,17 +213,17 @@ static place inner_place(cav_mjcf_reader *r, const cav_xml_node *node, const pla
 // all that moves with a body, frames included
 static void read_objects(cav_mjcf_reader *r, const cav_xml_node *node, const place *at) {
   for (const cav_xml_node *c = node->child; c && r->spec->status == CAV_OK; c = c->next) {
-    if (node_is(c, "joint") || node_is(c, "freejoint")) read_joint(r, c, at);
-    if (node_is(c, "geom")) read_geom(r, c, at);
-    if (node_is(c, "site")) read_site(r, c, at);
-    if (node_is(c, "composite"))
+    if (cav_xml_is(c, "joint") || cav_xml_is(c, "freejoint")) read_joint(r, c, at);
+    if (cav_xml_is(c, "geom")) read_geom(r, c, at);
+    if (cav_xml_is(c, "site")) read_site(r, c, at);
+    if (cav_xml_is(c, "composite"))
       cav_spec_lack(r->spec, c, NULL, "composite bodies are not supported; write the bodies out");
-    if (node_is(c, "flexcomp")) cav_spec_lack(r->spec, c, NULL, "flexible bodies are not supported; remove them");
-    if (node_is(c, "plugin")) cav_spec_lack(r->spec, c, NULL, "plugins that act on bodies are not supported");
-    if (node_is(c, "frame")) {
+    if (cav_xml_is(c, "flexcomp")) cav_spec_lack(r->spec, c, NULL, "flexible bodies are not supported; remove them");
+    if (cav_xml_is(c, "plugin")) cav_spec_lack(r->spec, c, NULL, "plugins that act on bodies are not supported");
+    if (cav_xml_is(c, "frame")) {
       place inner = inner_place(r, c, at);
       for (const cav_xml_node *i = c->child; i && at->body > 0; i = i->next) {
-        if (node_is(i, "inertial")) read_inertial(r, i, at->body, &inner);
+        if (cav_xml_is(i, "inertial")) read_inertial(r, i, at->body, &inner);
       }
       read_objects(r, c, &inner);
     }
@@ -234,11 +234,11 @@ static void read_objects(cav_mjcf_reader *r, const cav_xml_node *node, const pla
 static void read_bodies(cav_mjcf_reader *r, const cav_xml_node *node, const place *at) {
   cav_spec *spec = r->spec;
   for (const cav_xml_node *c = node->child; c && spec->status == CAV_OK; c = c->next) {
-    if (node_is(c, "frame")) {
+    if (cav_xml_is(c, "frame")) {
       place inner = inner_place(r, c, at);
       read_bodies(r, c, &inner);
     }
-    if (!node_is(c, "body")) continue;
+    if (!cav_xml_is(c, "body")) continue;
     cav_spec_body *b = CAV_SPEC_PUSH(spec, &spec->body);
     if (!b) return;
     *b = (cav_spec_body){.name = cav_xml_text(c, "name", ""), .node = c, .parent = at->body, .quat = {1, 0, 0, 0}};
@@ -253,7 +253,7 @@ static void read_bodies(cav_mjcf_reader *r, const cav_xml_node *node, const plac
     place in = {.body = spec->body.n - 1, .part = c->part, .quat = {1, 0, 0, 0}};
     in.childclass = cav_xml_text(c, "childclass", at->childclass);
     for (const cav_xml_node *i = c->child; i; i = i->next) {
-      if (node_is(i, "inertial")) read_inertial(r, i, in.body, NULL);
+      if (cav_xml_is(i, "inertial")) read_inertial(r, i, in.body, NULL);
     }
     read_objects(r, c, &in);
     read_bodies(r, c, &in);
@@ -273,7 +273,7 @@ static void read_world(cav_mjcf_reader *r, const cav_xml_node *root) {
   cav_spec *spec = r->spec;
   for (int pass = 0; pass < 2; pass++) {
     for (const cav_xml_node *c = root->child; c && spec->status == CAV_OK; c = c->next) {
-      if (!node_is(c, "worldbody")) continue;
+      if (!cav_xml_is(c, "worldbody")) continue;
       if (!spec->body.n) {
         cav_spec_body *b = CAV_SPEC_PUSH(spec, &spec->body);
         if (!b) return;

@@ -33,8 +33,6 @@ typedef struct cav_mjcf_reader {
 
 // small readers: an attribute that is absent leaves the default
 
-static inline int node_is(const cav_xml_node *node, const char *name) { return !strcmp(node->rule->name, name); }
-
 static inline void read_real(const cav_xml_node *node, const char *name, double *out) {
   *out = cav_xml_real(node, name, *out);
 }
@@ -55,7 +53,7 @@ static inline void read_limited(const cav_xml_node *node, const char *name, cav_
 static inline void read_sections(cav_mjcf_reader *r, const cav_xml_node *root, const char *name,
                                  void (*read)(cav_mjcf_reader *, const cav_xml_node *)) {
   for (const cav_xml_node *c = root->child; c && r->spec->status == CAV_OK; c = c->next) {
-    if (node_is(c, name)) read(r, c);
+    if (cav_xml_is(c, name)) read(r, c);
   }
 }
 

@@ -43,14 +43,12 @@ static void lose(omission *o, const char *kind, const char *name) {
   o->item[o->n++] = (lost){kind, name};
 }
 
-static int is(const cav_xml_node *node, const char *name) { return !strcmp(node->rule->name, name); }
-
 /// What references call the kind of an element.
 static const char *kind_of(const cav_xml_node *node) {
   const char *section = node->parent ? node->parent->rule->name : "";
   if (!strcmp(section, "tendon")) return "tendon";
   if (!strcmp(section, "actuator")) return "actuator";
-  return is(node, "freejoint") ? "joint" : node->rule->name;
+  return cav_xml_is(node, "freejoint") ? "joint" : node->rule->name;
 }
 
 static void lose_all(omission *o, const cav_xml_node *node) {
@@ -91,23 +89,13 @@ static void unlink_node(cav_xml_node *node) {
   *at = node->next;
 }
 
-/// The element of that kind and name among the children of a node, at any depth.
-static cav_xml_node *find(cav_xml_node *node, const char *kind, const char *name) {
-  for (cav_xml_node *c = node->child; c; c = c->next) {
-    if (is(c, kind) && !strcmp(cav_xml_text(c, "name", ""), name)) return c;
-    cav_xml_node *below = find(c, kind, name);
-    if (below) return below;
-  }
-  return NULL;
-}
-
 /// Takes out what refers to what is gone; returns whether there was such a thing.
 static int remove_referring(omission *o, cav_xml_node *root) {
   static const char *const sections[] = {"tendon", "actuator", "sensor", "equality", "contact"};
   int found = 0;
   for (cav_xml_node *section = root->child; section; section = section->next) {
     int known = 0;
-    for (size_t i = 0; i < sizeof sections / sizeof *sections; i++) known |= is(section, sections[i]);
+    for (size_t i = 0; i < sizeof sections / sizeof *sections; i++) known |= cav_xml_is(section, sections[i]);
     for (cav_xml_node *c = known ? section->child : NULL, *next; c; c = next) {
       next = c->next;
       if (!refers(o, c)) continue;
@@ -123,16 +111,16 @@ static int remove_referring(omission *o, cav_xml_node *root) {
 static void number_geoms(cav_xml_node *node, int *count) {
   for (cav_xml_node *c = node->child; c; c = c->next) {
     int inner = 0;
-    if (is(c, "geom")) c->number = ++*count;
-    number_geoms(c, is(c, "body") ? &inner : count);
+    if (cav_xml_is(c, "geom")) c->number = ++*count;
+    number_geoms(c, cav_xml_is(c, "body") ? &inner : count);
   }
 }
 
 /// The geom of that number in a body; bodies inside it are others.
 static cav_xml_node *find_number(cav_xml_node *body, long number) {
   for (cav_xml_node *c = body->child; c; c = c->next) {
-    if (is(c, "geom") && c->number == number) return c;
-    cav_xml_node *below = is(c, "body") ? NULL : find_number(c, number);
+    if (cav_xml_is(c, "geom") && c->number == number) return c;
+    cav_xml_node *below = cav_xml_is(c, "body") ? NULL : find_number(c, number);
     if (below) return below;
   }
   return NULL;
@@ -151,7 +139,7 @@ static cav_xml_node *find_named(cav_xml *xml, const cav_xml_node *remove, cav_er
   }
   cav_xml_node *found = NULL;
   for (cav_xml_node *c = ((cav_xml_node *)cav_xml_root(xml))->child; c && !found; c = c->next)
-    if (is(c, "worldbody")) found = body && !strcmp(body, "world") && number ? c : find(c, kind, name);
+    if (cav_xml_is(c, "worldbody")) found = body && !strcmp(body, "world") && number ? c : cav_xml_find(c, kind, name);
   if (!found)
     cav_xml_fail(error, remove, kind, "the file '%s' has no %s of that name, got '%.200s'", cav_xml_path(xml), kind,
                  name);
@@ -176,7 +164,7 @@ cav_status cav_xml_remove(cav_xml *xml, const cav_xml_node *scene, cav_error *er
   if (!numbered) return cav_xml_fail_as(error, CAV_NO_MEMORY, scene, NULL, "not enough memory");
   int count = 0;
   for (cav_xml_node *c = root->child; c; c = c->next)
-    if (is(c, "worldbody")) number_geoms(c, &count);
+    if (cav_xml_is(c, "worldbody")) number_geoms(c, &count);
   // found before anything goes
   for (const cav_xml_node *r = first; r && status == CAV_OK; r = cav_xml_next(r)) {
     if (has_number(r) && !(numbered[k++] = find_named(xml, r, error))) status = CAV_BAD_INPUT;

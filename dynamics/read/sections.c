@@ -8,12 +8,12 @@
 static void read_contact(cav_mjcf_reader *r, const cav_xml_node *node) {
   cav_spec *spec = r->spec;
   for (const cav_xml_node *c = node->child; c; c = c->next) {
-    if (node_is(c, "exclude")) {
+    if (cav_xml_is(c, "exclude")) {
       cav_spec_exclude *e = CAV_SPEC_PUSH(spec, &spec->exclude);
       if (!e) return;
       *e = (cav_spec_exclude){c, cav_xml_text(c, "body1", ""), cav_xml_text(c, "body2", "")};
     }
-    if (node_is(c, "pair")) {
+    if (cav_xml_is(c, "pair")) {
       cav_spec_pair *p = CAV_SPEC_PUSH(spec, &spec->pair);
       if (!p) return;
       *p = cav_mjcf_class_of(r, c, NULL)->pair;
@@ -33,7 +33,7 @@ static void read_equality_objects(const cav_xml_node *node, cav_spec_equality *e
                                          [CAV_EQUALITY_TENDON] = {"tendon", "tendon1", "tendon2"},
                                          [CAV_EQUALITY_DISTANCE] = {"distance", "geom1", "geom2"}};
   int type = 0;
-  while (!node_is(node, names[type][0])) type++;
+  while (!cav_xml_is(node, names[type][0])) type++;
   e->type = (cav_equality_type)type;
   for (int k = 0; k < 2; k++) e->object[k] = cav_xml_text(node, names[type][1 + k], NULL);
   e->sites = type <= CAV_EQUALITY_WELD && (cav_xml_get(node, "site1") || cav_xml_get(node, "site2"));
@@ -74,10 +74,10 @@ static void read_path(cav_spec *spec, const cav_xml_node *node, cav_spec_tendon 
     cav_spec_tendon_path *p = CAV_SPEC_PUSH(spec, &spec->path);
     if (!p) return;
     p->node = i;
-    p->type = node_is(i, "site")   ? CAV_TENDON_PATH_SITE
-              : node_is(i, "geom") ? CAV_TENDON_PATH_SPHERE
-                                   : CAV_TENDON_PATH_PULLEY;
-    p->name = cav_xml_text(i, node_is(i, "site") ? "site" : "geom", "");
+    p->type = cav_xml_is(i, "site")   ? CAV_TENDON_PATH_SITE
+              : cav_xml_is(i, "geom") ? CAV_TENDON_PATH_SPHERE
+                                      : CAV_TENDON_PATH_PULLEY;
+    p->name = cav_xml_text(i, cav_xml_is(i, "site") ? "site" : "geom", "");
     p->sidesite = cav_xml_text(i, "sidesite", NULL);
     p->divisor = cav_xml_real(i, "divisor", 1);
     t->npath++;
@@ -109,7 +109,7 @@ static void read_tendon(cav_mjcf_reader *r, const cav_xml_node *node) {
     t.node = c;
     t.part = spec->part.n;
     t.path = spec->path.n;
-    t.spatial = node_is(c, "spatial");
+    t.spatial = cav_xml_is(c, "spatial");
     if (t.spatial) read_path(spec, c, &t);
     for (const cav_xml_node *i = c->child; i && !t.spatial; i = i->next) {
       cav_spec_part *p = CAV_SPEC_PUSH(spec, &spec->part);
@@ -125,9 +125,9 @@ static void read_tendon(cav_mjcf_reader *r, const cav_xml_node *node) {
 
 // what is not read as an actuator; 1: one that is
 static int is_actuator(cav_spec *spec, const cav_xml_node *node) {
-  if (node_is(node, "adhesion") || (cav_xml_accepts(node, "body") && cav_xml_get(node, "body")))
+  if (cav_xml_is(node, "adhesion") || (cav_xml_accepts(node, "body") && cav_xml_get(node, "body")))
     cav_spec_leave(spec, node, NULL, "left out: adhesion is not supported; this is the model with that control at 0");
-  else if (node_is(node, "plugin"))
+  else if (cav_xml_is(node, "plugin"))
     cav_spec_lack(spec, node, NULL, "actuators that are plugins are not supported; write a general one instead");
   else if (!cav_xml_accepts(node, "ctrlrange"))
     cav_spec_lack(spec, node, NULL, "actuators of this kind are not supported; write a general one instead");
@@ -204,7 +204,7 @@ static void read_sensor(cav_mjcf_reader *r, const cav_xml_node *node, cav_sensor
 // whether a geom of that name stands in the file below a node
 static int has_geom(const cav_xml_node *node, const char *name) {
   for (const cav_xml_node *c = node->child; c; c = c->next) {
-    if (node_is(c, "geom") && !strcmp(cav_xml_text(c, "name", ""), name)) return 1;
+    if (cav_xml_is(c, "geom") && !strcmp(cav_xml_text(c, "name", ""), name)) return 1;
     if (has_geom(c, name)) return 1;
   }
   return 0;
@@ -223,7 +223,7 @@ static int is_of_missing(const cav_spec *spec, const cav_xml_node *node) {
   const char *name = cav_xml_text(node, "actuator", "");
   if (cav_name_find(spec->actuator.at, spec->actuator.n, sizeof *spec->actuator.at, name) >= 0) return 0;
   for (const cav_xml_node *s = root->child; s; s = s->next) {
-    for (const cav_xml_node *c = node_is(s, "actuator") ? s->child : NULL; c; c = c->next) {
+    for (const cav_xml_node *c = cav_xml_is(s, "actuator") ? s->child : NULL; c; c = c->next) {
       if (c->rule->flags & CAV_XML_ANYTHING) return 1;
       if (!strcmp(cav_xml_text(c, "name", ""), name)) return 1;
     }
@@ -234,7 +234,7 @@ static int is_of_missing(const cav_spec *spec, const cav_xml_node *node) {
 static void read_sensors(cav_mjcf_reader *r, const cav_xml_node *node) {
   for (const cav_xml_node *c = node->child; c; c = c->next) {
     int type = 0;
-    while (type < CAV_SENSOR_TYPES && !node_is(c, cav_sensor_rule_of((cav_sensor_type)type)->name)) type++;
+    while (type < CAV_SENSOR_TYPES && !cav_xml_is(c, cav_sensor_rule_of((cav_sensor_type)type)->name)) type++;
     if (type < CAV_SENSOR_TYPES && !is_of_missing(r->spec, c))
       read_sensor(r, c, (cav_sensor_type)type);
     else
@@ -259,7 +259,7 @@ static void read_keys(cav_mjcf_reader *r, const cav_xml_node *node) {
 
 static void read_deformables(cav_mjcf_reader *r, const cav_xml_node *node) {
   for (const cav_xml_node *c = node->child; c; c = c->next) {
-    if (node_is(c, "flex")) cav_spec_lack(r->spec, c, NULL, "flexible bodies are not supported; remove them");
+    if (cav_xml_is(c, "flex")) cav_spec_lack(r->spec, c, NULL, "flexible bodies are not supported; remove them");
   }
 }
 

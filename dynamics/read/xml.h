@@ -118,6 +118,12 @@ int cav_xml_prose(const cav_xml *xml, const char **file, int *line);
 const cav_xml_node *cav_xml_child(const cav_xml_node *node, const cav_xml_element *rule);
 const cav_xml_node *cav_xml_next(const cav_xml_node *node);
 
+/// Whether an element has that name.
+int cav_xml_is(const cav_xml_node *node, const char *name);
+
+/// The element of that kind and name among what is in a node, at any depth; NULL if none.
+cav_xml_node *cav_xml_find(const cav_xml_node *node, const char *kind, const char *name);
+
 /// The attribute of that name, NULL if the file does not give it.
 const cav_xml_value *cav_xml_get(const cav_xml_node *node, const char *name);
 

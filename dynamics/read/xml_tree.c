@@ -69,6 +69,17 @@ const cav_xml_node *cav_xml_child(const cav_xml_node *node, const cav_xml_elemen
 
 const cav_xml_node *cav_xml_next(const cav_xml_node *node) { return first_of(node->next, node->rule); }
 
+int cav_xml_is(const cav_xml_node *node, const char *name) { return !strcmp(node->rule->name, name); }
+
+cav_xml_node *cav_xml_find(const cav_xml_node *node, const char *kind, const char *name) {
+  for (cav_xml_node *c = node->child; c; c = c->next) {
+    if (cav_xml_is(c, kind) && !strcmp(cav_xml_text(c, "name", ""), name)) return c;
+    cav_xml_node *below = cav_xml_find(c, kind, name);
+    if (below) return below;
+  }
+  return NULL;
+}
+
 const cav_xml_value *cav_xml_get(const cav_xml_node *node, const char *name) {
   for (int i = 0; i < node->nvalue; i++) {
     if (!strcmp(node->value[i].rule->name, name)) return &node->value[i];

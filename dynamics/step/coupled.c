@@ -31,12 +31,6 @@ typedef struct rows {
   double *scratch; ///< [2 (n+m)^2]
 } rows;
 
-static double dot(const double *a, const double *b, int n) {
-  double sum = 0;
-  for (int i = 0; i < n; i++) sum += a[i] * b[i];
-  return sum;
-}
-
 // blocks of the Jacobian and W
 static cav_status fill(rows *r, const cav_model *model, cav_state *state) {
   cav_workspace *w = state->work;

@@ -68,16 +68,6 @@ size_t cav_elimination_bytes(const cav_elimination *e) {
   return e ? sizeof *e + e->npattern + e->nnumbers + e->nrows : 0;
 }
 
-// room for so many bytes; what was there is lost. 0 if memory runs out
-static int make_room(void **room, size_t *bytes, size_t wanted) {
-  if (wanted <= *bytes) return 1;
-  free(*room);
-  *bytes = wanted + wanted / 2;
-  *room = malloc(*bytes);
-  if (!*room) *bytes = 0;
-  return *room != NULL;
-}
-
 // ---------------------------------------------------------------- pattern
 
 static int highest_bit(const uint64_t *set, int words) {
@@ -231,7 +221,7 @@ static int open_pattern(cav_elimination *e, size_t n, size_t ncliques, size_t me
                         member **to, run **runs, int **scratch) {
   const size_t bytes = sets * sizeof(uint64_t) + ncliques * sizeof(clique) + members * (sizeof(member) + sizeof(run)) +
                        (8 * n + 1) * sizeof(int);
-  if (!make_room(&e->pattern, &e->npattern, bytes)) return 0;
+  if (!make_room(&e->pattern, &e->npattern, bytes, 1)) return 0;
   *before = e->pattern;
   e->clique = (clique *)(*before + sets);
   *to = (member *)(e->clique + ncliques);
@@ -260,10 +250,10 @@ cav_status cav_elimination_begin(cav_elimination *e, const cav_impulse *part, in
   find_tree(e, dof, local, before, (int)words, scratch);
   number_dofs(e, dof, scratch, scratch + n, scratch + 2 * n);
   const size_t rows = fill_cliques(e, local, to, runs, &wide), entries = (size_t)e->row[n];
-  if (!make_room(&e->numbers, &e->nnumbers, (2 * entries + 4 * n + FOUR) * sizeof(double) + entries * sizeof(int)))
+  if (!make_room(&e->numbers, &e->nnumbers, (2 * entries + 4 * n + FOUR) * sizeof(double) + entries * sizeof(int), 1))
     return CAV_NO_MEMORY;
   // room for one where there is no contact, so that there is an array
-  if (!make_room(&e->rows, &e->nrows, (rows + wide + 1) * sizeof(double))) return CAV_NO_MEMORY;
+  if (!make_room(&e->rows, &e->nrows, (rows + wide + 1) * sizeof(double), 1)) return CAV_NO_MEMORY;
   e->inertia = e->numbers;
   e->value = e->inertia + entries;
   double *at = e->value + entries, **const array[] = {&e->least, &e->pivot, &e->x, &e->along};
@@ -278,12 +268,6 @@ cav_status cav_elimination_begin(cav_elimination *e, const cav_impulse *part, in
 }
 
 // ---------------------------------------------------------------- values
-
-static int is_zero(const double *H, int n) {
-  for (int i = 0; i < n; i++)
-    if (H[i] != 0.0) return 0;
-  return 1;
-}
 
 #define AT_FOUR(x) (*(const cav_four *)(x))
 

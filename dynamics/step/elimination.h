@@ -2,7 +2,27 @@
 #ifndef CAVORT_ELIMINATION_H
 #define CAVORT_ELIMINATION_H
 
+#include <stdlib.h>
+
 #include "impulse.h"
+
+/// Room for count items; what was there is lost. 0 if memory runs out. For hessian.c too, as the next.
+static inline int make_room(void *array, size_t *room, size_t count, size_t size) {
+  void **items = array;
+  if (count <= *room) return 1;
+  free(*items);
+  *room = count + count / 2;
+  *items = malloc(*room * size);
+  if (!*items) *room = 0;
+  return *items != NULL;
+}
+
+/// Whether a block pulls nowhere: all n numbers of its curvature are 0.
+static inline int is_zero(const double *H, int n) {
+  for (int i = 0; i < n; i++)
+    if (H[i] != 0.0) return 0;
+  return 1;
+}
 
 /// Kept by a state from step to step for its memory; opaque. elimination.c.
 typedef struct cav_elimination cav_elimination;

@@ -49,12 +49,6 @@ typedef struct gpgs {
   double *moved;   // [nv] scratch
 } gpgs;
 
-static double dot(const double *a, const double *b, int n) {
-  double sum = 0.0;
-  for (int i = 0; i < n; i++) sum += a[i] * b[i];
-  return sum;
-}
-
 // factors the symmetric Q + shift (n <= 5) as C C' and solves for x = -(Q + shift)^-1 c; curvature gets x' (Q +
 // shift)^-1 x
 static int solve_shifted(int n, const double *Q, double shift, const double *c, double *x, double *curvature) {

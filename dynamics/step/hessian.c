@@ -84,17 +84,6 @@ int cav_hessian_sparse_islands(const cav_hessian *h) { return h->used; }
 
 void cav_hessian_restart(cav_hessian *h) { h->used = 0; }
 
-// room for count items; what was there is lost. 0 if memory runs out
-static int make_room(void *array, size_t *room, size_t count, size_t size) {
-  void **items = array;
-  if (count <= *room) return 1;
-  free(*items);
-  *room = count + count / 2;
-  *items = malloc(*room * size);
-  if (!*items) *room = 0;
-  return *items != NULL;
-}
-
 // ---------------------------------------------------------------- pattern
 
 // cliques are runs of blocks that see the same dofs: numbers the blocks by them. CAV_NO_MEMORY
@@ -392,12 +381,6 @@ static cav_status follow_pattern(cav_hessian *h, const double *curvature) {
 }
 
 // ---------------------------------------------------------------- values
-
-static int is_zero(const double *H, int n) {
-  for (int i = 0; i < n; i++)
-    if (H[i] != 0.0) return 0;
-  return 1;
-}
 
 // sum [n*n] of J' H J of one block, the part on and right of the diagonal
 static void bend_block(const cav_block *block, const double *H, double *sum) {

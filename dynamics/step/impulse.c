@@ -163,17 +163,7 @@ void cav_impulse_push(const cav_impulse *p, double s, const double *f, double *r
 }
 
 void cav_impulse_inertia(const cav_impulse *p, const double *x, double *r) {
-  const cav_workspace *work = p->state->work;
-  for (int i = 0; i < p->nv; i++) {
-    const double *M = p->M + work->row[i], own = x[i];
-    // nothing has come to r[i] yet: that is from dofs behind it
-    double sum = M[0] * own;
-    for (int j = work->parent[i], k = 1; j >= 0; j = work->parent[j], k++) {
-      sum += M[k] * x[j];
-      r[j] += M[k] * own;
-    }
-    r[i] = sum;
-  }
+  for (int i = 0; i < p->nv; i++) cav_impulse_inertia_of(p, i, x, r);
 }
 
 // soft equality: f = g, whatever it is

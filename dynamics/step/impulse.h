@@ -47,6 +47,25 @@ void cav_impulse_push(const cav_impulse *problem, double s, const double *f, dou
 /// r := M x, x, r [nv], not the same.
 void cav_impulse_inertia(const cav_impulse *problem, const double *x, double *r);
 
+/// What dof i has in M x, to r, after all dofs before it.
+static inline void cav_impulse_inertia_of(const cav_impulse *problem, int i, const double *x, double *r) {
+  const cav_workspace *work = problem->state->work;
+  const double *M = problem->M + work->row[i], own = x[i];
+  // nothing has come to r[i] yet: that is from dofs behind it
+  double sum = M[0] * own;
+  for (int j = work->parent[i], k = 1; j >= 0; j = work->parent[j], k++) {
+    sum += M[k] * x[j];
+    r[j] += M[k] * own;
+  }
+  r[i] = sum;
+}
+
+static inline double dot(const double *a, const double *b, int n) {
+  double sum = 0;
+  for (int i = 0; i < n; i++) sum += a[i] * b[i];
+  return sum;
+}
+
 /// Impulse of one block at its constraint velocity v_next: y, f [nrow] of the whole problem. hessian [dim*dim] and
 /// potential may be NULL; Coulomb's law has a potential only while held is given.
 void cav_impulse_law(const cav_impulse *problem, const cav_block *block, const double *y, double *f, double *hessian,

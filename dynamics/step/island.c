@@ -66,18 +66,7 @@ void cav_islands_find(cav_impulse *p, double *room, cav_islands *s) {
 }
 
 void cav_island_inertia(const cav_impulse *p, int ndof, const int *dof, const double *x, double *r) {
-  const cav_workspace *work = p->state->work;
-  for (int e = 0; e < ndof; e++) {
-    const int i = dof[e];
-    const double *M = p->M + work->row[i], own = x[i];
-    // nothing has come to r[i] yet: that is from dofs behind it
-    double sum = M[0] * own;
-    for (int j = work->parent[i], k = 1; j >= 0; j = work->parent[j], k++) {
-      sum += M[k] * x[j];
-      r[j] += M[k] * own;
-    }
-    r[i] = sum;
-  }
+  for (int e = 0; e < ndof; e++) cav_impulse_inertia_of(p, dof[e], x, r);
 }
 
 void cav_island_fall(const cav_impulse *p, int ndof, const int *dof, double *x) {

@@ -53,12 +53,6 @@ static inline double largest(const double *x, int n) {
   return most;
 }
 
-static inline double dot(const double *a, const double *b, int n) {
-  double sum = 0.0;
-  for (int i = 0; i < n; i++) sum += a[i] * b[i];
-  return sum;
-}
-
 static inline void copy(double *to, const double *from, int n) {
   if (n > 0) memcpy(to, from, (size_t)n * sizeof *to);
 }
