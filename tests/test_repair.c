@@ -1,5 +1,5 @@
-/// Repairs: what a strategy that is not certified, or misses what was asked, is changed by before it is solved again; by verdicts that
-/// are written here, of a problem that is never solved.
+/// Repairs: what a strategy that is not certified, or misses what was asked, is changed by before it is solved again; by
+/// verdicts that are written here, of a problem that is never solved.
 #include "biped.h"
 #include "continuation.h"
 #include "scene.h"

@@ -1,5 +1,5 @@
-/// The closed loops of a motion under its gains: those that a certificate asks for, the same and two small pushes for the choice of
-/// gains, and the largest push that a certified motion survives. One loop: replay.c.
+/// The closed loops of a motion under its gains: those that a certificate asks for, the same and two small pushes for the
+/// choice of gains, and the largest push that a certified motion survives. One loop: replay.c.
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>

@@ -1,5 +1,5 @@
-/// A motion under examination: whether it fits its problem and all of it is numbers, its velocities from the knots, and what is kept
-/// of it; worst values and names. What is measured of it: verify.c.
+/// A motion under examination: whether it fits its problem and all of it is numbers, its velocities from the knots, and
+/// what is kept of it; worst values and names. What is measured of it: verify.c.
 #include "verification.h"
 
 #include <math.h>
