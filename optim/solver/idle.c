@@ -13,6 +13,7 @@
 #include "continuation.h"
 #include "driven.h"
 #include "lqr.h"
+#include "problem_file.h"
 #include "transcription.h"
 
 // ---------------------------------------------------------------- what is asked for
@@ -122,7 +123,7 @@ static void keep_asked(const marks *a, const cav_term *term) {
   if (of == CAV_OF_USER) keep_all(a); // what it looks at it alone knows, by the numbers of this model
   if (of == CAV_OF_CONTACTS && term->body > 0) keep_object(a, CAV_OBJECT_BODY, term->body);
   for (int d = 0; (of == CAV_OF_POSTURE || of == CAV_OF_RATE) && d < m->nv; d++) {
-    if (!cav_term_selects(m, term, d)) continue;
+    if (!cav_problem_selects(m, term, d)) continue;
     int asked = term->use != CAV_USE_COST || term->dofs == CAV_DOFS_ONE;
     if (of == CAV_OF_POSTURE) asked |= wants_posture(a->problem, term, &m->joint[m->dof[d].joint]);
     if (of == CAV_OF_RATE) asked |= wants_rate(a->problem, term, d);

@@ -5,6 +5,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "problem_file.h"
 #include "quantity.h"
 #include "recorded.h"
 #include "rotation.h"
@@ -81,25 +82,7 @@ int cav_term_readings(const cav_transcription *tr, const cav_term *term, int t) 
 }
 
 int cav_dof_selected(const cav_transcription *tr, const cav_term *term, int d) {
-  return cav_term_selects(tr->model, term, d);
-}
-
-int cav_term_selects(const cav_model *m, const cav_term *term, int d) {
-  const cav_joint *joint = &m->joint[m->dof[d].joint];
-  int free_joint = joint->type == CAV_JOINT_FREE;
-  switch (term->dofs) {
-    case CAV_DOFS_ALL:
-      return 1;
-    case CAV_DOFS_ROOT_LINEAR:
-      return free_joint && d < joint->dof + 3;
-    case CAV_DOFS_ROOT_ANGULAR:
-      return free_joint && d >= joint->dof + 3;
-    case CAV_DOFS_JOINTS:
-      return !free_joint;
-    case CAV_DOFS_ONE:
-      return m->dof[d].joint == term->joint;
-  }
-  return 0;
+  return cav_problem_selects(tr->model, term, d);
 }
 
 /// Target of a term at a knot: constant, waypoints, or zeros.

@@ -324,7 +324,6 @@ int cav_term_is_reading(const cav_term *term);
 int cav_term_dim(const cav_term *term);
 int cav_term_readings(const cav_transcription *transcription, const cav_term *term, int t);
 int cav_dof_selected(const cav_transcription *transcription, const cav_term *term, int dof);
-int cav_term_selects(const cav_model *model, const cav_term *term, int dof);
 void cav_term_read(const cav_transcription *transcription, cav_state *state, const cav_term *term, int t, double *y);
 
 /// Time of a knot for windows and targets: a fraction of the problem's duration, whatever the step has become. terms.c.
