@@ -103,6 +103,12 @@ char *cav_problem_scene(cav_problem_owner *owner, const cav_xml_node *scene);
 /// holds a knot. term.c.
 cav_status cav_problem_window(const cav_problem_reader *reader, const cav_xml_node *node, double *from, double *to);
 
+/// Of a step: how far the duration may be from a whole number of them.
+#define CAV_WHOLE_STEP 1e-6
+
+/// <guess>, once start and goal are known. initial_guess.c.
+cav_status cav_problem_initial_guess(const cav_problem_reader *reader);
+
 /// All <parameter>, and the values that they give the model, of which no state may be left. parameter_list.c.
 cav_status cav_problem_parameters(const cav_problem_reader *reader);
 
