@@ -2,9 +2,9 @@
 ///
 /// The file is checked against grammar.c while it is read; what is left here is what only the whole can tell: that
 /// names stand for something in the model, that windows lie in the horizon, that nothing contradicts. Postures are read
-/// by pose.c, guesses by initial_guess.c, terms by term.c; write.c is the way back. The weights and the schedule come from trials on a 27-dof
-/// humanoid (squat, jump, walk, get-up) and serve other bodies because all quantities are scaled by weight, limits and
-/// lengths. Does not decides whether a motion is possible.
+/// by pose.c, guesses by initial_guess.c, terms by term.c; write.c is the way back. The weights and the schedule come
+/// from trials on a 27-dof humanoid (squat, jump, walk, get-up) and serve other bodies because all quantities are
+/// scaled by weight, limits and lengths. Does not decides whether a motion is possible.
 #include "cavort/problem.h"
 
 #include <float.h>
