@@ -172,6 +172,8 @@ run 2 inspect modelless.xml
 says err "--model FILE"
 check "nothing was written" [ ! -e swing.result ]
 run 0 inspect problem.xml
+check "the verdict comes last, in brief, too" [ "$(tail -n 1 out)" = "nothing proves it impossible: cavort solve problem.xml" ]
+run 0 inspect problem.xml --all
 says out "pendulum"
 says out "left out: no tree"
 says out "us, factors "

@@ -81,6 +81,10 @@ void cav_problem_free(cav_problem *problem) {
   if (problem) free_owner(problem->owner);
 }
 
+int cav_problem_has_goal(const cav_problem *problem) {
+  return ((const cav_problem_owner *)(const void *)problem)->goal;
+}
+
 const cav_xml_node *cav_problem_child(const cav_xml_node *node, const char *name) {
   const cav_xml_node *child = node ? node->child : NULL;
   while (child && strcmp(child->rule->name, name)) child = child->next;
@@ -385,6 +389,7 @@ static cav_status read_ends(const cav_problem_reader *reader) {
   const cav_xml_node *start = cav_problem_child(reader->root, "start"), *goal = cav_problem_child(reader->root, "goal");
   cav_status status = cav_problem_pose(reader, start, p->q_start);
   p->free_start = cav_xml_bool(start, "free", 0);
+  reader->owner->goal = goal != NULL;
   // one that is free is brought into ranges by the solver
   if (!status && !p->free_start) status = check_ranges(reader, start, p->q_start);
   if (status) return status;

@@ -192,6 +192,19 @@ const cav_contact *cav_command_deepest(const cav_state *state);
 /// something, a line each; their number. postures.c.
 int cav_command_tell_postures(FILE *out, const cav_problem *problem);
 
+/// Says of a <goal> that no term asks for where a term wants another reading at the end; their number. postures.c.
+int cav_command_tell_goal(FILE *out, const cav_problem *problem);
+
+/// Prints what terms with a target read at the start and at the goal, and what they want: a line each. asked.c.
+cav_status cav_command_print_asked(const cav_problem *problem, cav_error *error);
+
+/// The free joint of a tree with actuators whose place and tilt a posture term of joints leaves open; -1: none. asked.c.
+int cav_command_base(const cav_problem *problem, const cav_term *term);
+
+/// Whether a term is of forces at the last knot of a motion that does not close at rest, where there are none: nothing
+/// measures it. asked.c.
+int cav_command_unmeasured(const cav_problem *problem, const cav_term *term);
+
 /// Whether gravity and contacts alone act on a tree of links that floats, none of it lifted by buoyancy. postures.c.
 int cav_command_floats(const cav_model *model, int root);
 
