@@ -399,7 +399,6 @@ static cav_status examine_height(cav_examination *e, const supply *s, int first,
       e, CAV_CONDITION_ENERGY, r, "More time, a lower target, or stronger actuators.",
       "%s, too high for the actuators: it needs %.3g J more than the start has, they give at most %.3g J by then; %s",
       what, needs - has, can - has, time);
-  // a time of pumping, as the conditions of one hinge tell it
   cav_impossible_fraction(e, isfinite(least) ? t / least : 1);
   return CAV_OK;
 }

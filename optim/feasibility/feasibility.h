@@ -27,7 +27,7 @@ typedef struct cav_proof {
   cav_impossibility said;
   cav_requirement_kind kind; ///< of the requirement that cannot be met
   int object;                ///< of it, -1: it has none
-  double fraction;           ///< bound over what is asked: the less, the tighter; 0: no number bounds it
+  double fraction;           ///< bound over what is asked: the less, the tighter; 0: exact, or no number bounds it
 } cav_proof;
 
 enum { CAV_PROOFS = 32 }; ///< most that are looked for

@@ -226,7 +226,6 @@ static void examine_time(cav_examination *e, const cav_hinge *hinge, const cav_r
   cav_requirement_words(e, r, what, sizeof what);
   cav_impossible(e, CAV_CONDITION_ENERGY, r, "More time, or a stronger actuator.",
                  "%s, too much for the actuators in the time: %s%s (exact for one hinge)", what, least, more);
-  cav_impossible_fraction(e, time / fmin(needs, longer * time));
 }
 
 cav_status cav_examine_hinge(cav_examination *e) {
