@@ -206,7 +206,7 @@ has nameless.mpc/runs.csv
 # --- solving ---
 
 run 0 solve problem.xml
-says out "certified: swing on pendulum"
+says out "certified: swing on pendulum; achieved"
 says err "continuation"
 for name in trajectory.csv forces.csv controls.csv gains.csv log.csv stages.csv problem.xml strategies.csv verdict.json view.html; do has "swing.result/$name"; done
 sum() { sha256sum "$1" | cut -d' ' -f1; }
@@ -247,7 +247,7 @@ fi
 
 cp swing.result/verdict.json before.json
 run 0 verify swing.result
-says out "certified: swing on pendulum"
+says out "certified: swing on pendulum; achieved"
 run 0 verify swing.result --json
 says out '"certified": true'
 check "as optimal from the files as when it was solved" [ "$(grep '"optimality"' out)" = "$(grep '"optimality"' before.json)" ]
@@ -338,6 +338,22 @@ run 0 inspect aside.xml
 says out "note: 'beside' asks for component x along the principal axes of body 'rod', which are turned by"
 run 0 inspect aside.xml --set cost/beside/@reftype=xbody
 check "axes of the file are not told" [ "$(grep -c 'principal axes' out)" = 0 ]
+
+# --- a vector that is missed: what is wanted, got and off are of one component; both words in the line of the certificate ---
+
+echo '<mujoco><worldbody><body name="ball" pos="0 0 9"><freejoint/><geom size=".1" mass="1"/></body></worldbody></mujoco>' >ball.xml
+cat >drop.xml <<'TEXT'
+<problem name="drop" model="ball.xml"><horizon duration="0.5" timestep="0.05" close="open"/><start qvel="1 0 0 0 0 0"/>
+<cost><sensor name="there" type="framepos" body="ball" target="0.5 0.3 8.3" at="end" weight="9"/></cost></problem>
+TEXT
+run 1 solve drop.xml --strategies 1 --threads 1 --force
+check "a component's own off" grep -qE "^  there +framepos z +0.5 +8.3 +7.[0-9]+ +0.6[0-9]* +0.03 m MISSED \(0.7[0-9]* as a vector\)" out
+says out "certified: drop; NOT achieved"
+check "in words" grep -qE "misses 'there' by 0.7[0-9]* m \(within 0.03\) at 0.5 s: z alone by 0.6[0-9]*, wanted 8.3, got 7" out
+run 1 explain drop.result
+check "and by explain" grep -qE "^not achieved: misses 'there' by 0.7[0-9]* m \(within 0.03\) at 0.5 s: z alone by 0.6" out
+run 1 solve drop.xml --strategies 1 --threads 1 --force --set cost/there/@component=z --set cost/there/@target=8.3 -o fell
+check "of one component there is one number" grep -qE "^  there +framepos z +0.5 +8.3 +7.[0-9]+ +0.6[0-9]* +0.03 m MISSED$" out
 
 # --- what is given where something else is wanted: what it is, and the command that was meant ---
 

@@ -183,6 +183,19 @@ static void tell_remedy(const cav_result *result, const cav_verdict *verdict, co
   if (found) cav_strategy_clear(&repaired);
 }
 
+/// The words of a verdict, of a vector that is missed those that its components agree with.
+static void tell_vectors(const cav_result *result, cav_verdict *verdict) {
+  const cav_problem *p = result->problem;
+  cav_term_report *report = calloc((size_t)p->nterm + 1, sizeof *report);
+  cav_error ignored = {0};
+  char words[sizeof verdict->missed];
+  if (report && !verdict->achieved && !cav_terms_report(p, result->trajectory, &p->contact, report, NULL, &ignored)) {
+    cav_certificate_missed(p, verdict, report, words, sizeof words);
+    memcpy(verdict->missed, words, sizeof words);
+  }
+  free(report);
+}
+
 int cav_command_explain(const cav_command_line *line) {
   cav_error error = {0};
   cav_result *result = cav_result_read(line->operand, line->model, &error);
@@ -194,6 +207,7 @@ int cav_command_explain(const cav_command_line *line) {
   if (!status)
     status = cav_verify(result->problem, result->trajectory, &result->problem->contact, result->gain_q, result->gain_v,
                         &verdict, &error);
+  if (!status) tell_vectors(result, &verdict);
   cav_impossibility impossible;
   int proofs = 0;
   char pumping[CAV_PUMPING_TEXT] = "";

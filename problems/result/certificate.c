@@ -108,6 +108,33 @@ static void print_wanted(const cav_term *term, const cav_term_report *r, char *t
     snprintf(text, size, "%.4g", r->wanted);
 }
 
+/// What a report's component is off by itself; that of a vector is less than its length, by which it is judged.
+static double own_off(const cav_term *term, const cav_term_report *r) {
+  const int vector = term->quantity == CAV_QUANTITY_SENSOR && term->component < 0 && term->sensor.dim > 1;
+  const double own = fabs(r->got - r->wanted);
+  return vector && own < 0.999 * r->off ? own : r->off;
+}
+
+void cav_certificate_missed(const cav_problem *problem, const cav_verdict *v, const cav_term_report *report, char *text,
+                            size_t size) {
+  int worst = -1;
+  for (int i = 0; i < problem->nterm && report; i++) {
+    const cav_term_report *r = &report[i];
+    if (r->has_target && !r->met && (worst < 0 || r->off / r->within > report[worst].off / report[worst].within))
+      worst = i;
+  }
+  snprintf(text, size, "%s", v->missed);
+  if (worst < 0 || own_off(&problem->term[worst], &report[worst]) == report[worst].off) return;
+  const cav_term *term = &problem->term[worst];
+  const cav_term_report *r = &report[worst];
+  const int named = *term->name && strcmp(term->name, cav_quantity_rule_of(term->quantity)->name);
+  const char *space = strrchr(r->what, ' ');
+  const int kind = space ? (int)(space - r->what) : (int)strlen(r->what);
+  snprintf(text, size, "'%.*s' by %.3g %s (within %.3g) at %.3g s:%s alone by %.3g, wanted %.4g, got %.4g",
+           named ? 60 : kind, named ? term->name : r->what, r->off, r->unit, r->within, r->time, space ? space : "",
+           fabs(r->got - r->wanted), r->wanted, r->got);
+}
+
 // targets, those missed first; a line for the rest
 static void print_targets(FILE *out, const cav_problem *problem, const cav_term_report *report) {
   static const char *const mark[] = {"MISSED", "ok"};
@@ -119,12 +146,14 @@ static void print_targets(FILE *out, const cav_problem *problem, const cav_term_
     for (int i = 0; i < problem->nterm && shown < TARGETS_SHOWN; i++) {
       const cav_term_report *r = &report[i];
       if (!r->has_target || r->met != met) continue;
-      char within[24] = "", wanted[40];
+      char within[24] = "", wanted[40], whole[40] = "";
+      const double own = own_off(&problem->term[i], r);
+      if (own < r->off) snprintf(whole, sizeof whole, " (%.3g as a vector)", r->off);
       print_wanted(&problem->term[i], r, wanted, sizeof wanted);
       if (isfinite(r->within)) snprintf(within, sizeof within, "%.3g", r->within);
       const char *name = problem->term[i].name && *problem->term[i].name ? problem->term[i].name : "unnamed";
-      fprintf(out, "  %-30.30s %-18.18s %8.4g %10s %10.4g %10.3g %10s %s %s\n", name, r->what, r->time, wanted, r->got,
-              r->off, within, r->unit, isfinite(r->within) ? mark[r->met] : "");
+      fprintf(out, "  %-30.30s %-18.18s %8.4g %10s %10.4g %10.3g %10s %s %s%s\n", name, r->what, r->time, wanted,
+              r->got, own, within, r->unit, isfinite(r->within) ? mark[r->met] : "", whole);
       shown++;
     }
   }
@@ -179,7 +208,9 @@ void cav_certificate_print(FILE *out, const cav_problem *problem, const cav_verd
   if (*problem->model->name) fprintf(out, " on %s", problem->model->name);
   if (!isnan(v->residual_fraction_max))
     fprintf(out, ", with residual forces on its root of up to %.3g %% of the weight", 100 * v->residual_fraction_max);
-  fputc('\n', out);
+  // both words in the line that is looked for
+  fprintf(out, v->achieved ? "; achieved%s\n" : "; NOT achieved%s\n",
+          v->achieved && !v->ntarget ? " (nothing had to be met)" : "");
   int missed = 0;
   for (int i = 0; i < n; i++) missed += line[i].passed == 0;
   if (!v->certified) fprintf(out, "  %s\n", v->reason);
@@ -209,7 +240,9 @@ void cav_certificate_print(FILE *out, const cav_problem *problem, const cav_verd
             "looked at\n",
             v->end_body, v->end_speed_m_s, v->end_rate_rad_s);
   if (v->achieved) return;
-  fprintf(out, "NOT achieved: %s misses %s", v->certified ? "it obeys physics, but" : "it also", v->missed);
+  char words[sizeof v->missed + 80];
+  cav_certificate_missed(problem, v, report, words, sizeof words);
+  fprintf(out, "NOT achieved: %s misses %s", v->certified ? "it obeys physics, but" : "it also", words);
   if (v->nmissed > 1) fprintf(out, ", and %d more of %d targets", v->nmissed - 1, v->ntarget);
   fputc('\n', out);
 }

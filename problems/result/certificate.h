@@ -24,4 +24,9 @@ int cav_certificate_lines(const cav_verdict *verdict, cav_certificate_line line[
 void cav_certificate_print(FILE *out, const cav_problem *problem, const cav_verdict *verdict,
                            const cav_term_report *report);
 
+/// What of the targets is missed by most: the verdict's words, of a vector with what its worst component alone is off by.
+/// report [problem->nterm], NULL: not known.
+void cav_certificate_missed(const cav_problem *problem, const cav_verdict *verdict, const cav_term_report *report,
+                            char *text, size_t size);
+
 #endif
