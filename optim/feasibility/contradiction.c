@@ -69,8 +69,17 @@ static void examine_range(cav_examination *e, const cav_requirement *r) {
   const double room = slack + cav_joint_stop(joint);
   if (!joint->limited || (r->low[0] <= joint->range[1] + room && r->high[0] >= joint->range[0] - room)) return;
   cav_requirement_words(e, r, what, sizeof what);
-  cav_impossible(e, CAV_CONDITION_RANGE, r, "Move the target into the range, or check the range in the model.",
-                 "%s, but its range is %.4g to %.4g", what, joint->range[0], joint->range[1]);
+  char cure[160] = "Move the target into the range, or check the range in the model.";
+  // a number that was meant in degrees
+  const double wanted = isinf(r->low[0]) ? r->high[0] : isinf(r->high[0]) ? r->low[0] : (r->low[0] + r->high[0]) / 2;
+  const double turned = wanted * M_PI / 180, edge = 0.1;
+  const int beyond = wanted < joint->range[0] - edge || wanted > joint->range[1] + edge;
+  if (joint->type == CAV_JOINT_HINGE && beyond && turned >= joint->range[0] && turned <= joint->range[1])
+    snprintf(cure, sizeof cure,
+             "Targets are in radians, whatever <compiler angle> of the model says: %.4g degrees are %.4g.", wanted,
+             turned);
+  cav_impossible(e, CAV_CONDITION_RANGE, r, cure, "%s, but its range is %.4g to %.4g", what, joint->range[0],
+                 joint->range[1]);
 }
 
 // ---------------------------------------------------------------- two of one reading

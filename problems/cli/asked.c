@@ -1,6 +1,6 @@
 /// What the terms of a problem ask for beside what its start and goal have: a line a term, with units. Readings of places and
 /// orientations at both postures, of velocities at the start; forces are not known of a posture. And of single terms what
-/// their words hide: that a posture of joints leaves a free base open, that a force at an open end is never measured.
+/// their words hide: that a posture of joints leaves a free base open, that a force at an open end is never measured, that numbers are likely to be of another unit.
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -252,4 +252,83 @@ cav_status cav_command_print_asked(const cav_problem *p, cav_error *error) {
   cav_state_free(c.goal);
   free(c.work);
   return status;
+}
+
+/// Rotations of a hinge, and metres, from which on another unit is likely.
+static const double many_turns = 4 * M_PI, far_away = 50;
+
+/// "'knee'", or what the term is of, for a note.
+static const char *called(const cav_problem *p, const cav_term *term, char name[NAME]) {
+  cav_term whole = *term;
+  if (*term->name) whole.component = -1;
+  write_name(p, &whole, name);
+  return name;
+}
+
+/// Of a hinge that is wanted at an angle of many turns.
+static int tell_degrees(FILE *out, const cav_problem *p, const cav_term *term) {
+  const cav_model *m = p->model;
+  const int sensor = term->quantity == CAV_QUANTITY_SENSOR && term->sensor.type == CAV_SENSOR_JOINTPOS;
+  const int posture = term->quantity == CAV_QUANTITY_CONFIGURATION && term->dofs == CAV_DOFS_ONE;
+  char name[NAME];
+  if ((!sensor && !posture) || !term->target || term->nwaypoint) return 0;
+  const cav_joint *joint = &m->joint[sensor ? term->sensor.object : term->joint];
+  const double wanted = joint->type == CAV_JOINT_HINGE ? term->target[sensor ? 0 : joint->q] : 0;
+  if (!(fabs(wanted) > many_turns)) return 0;
+  fprintf(out, "note: %s wants joint '%.60s' at %g rad, %.3g turns: targets are in radians; %g degrees are %.4g\n",
+          called(p, term, name), joint->name, wanted, fabs(wanted) / (2 * M_PI), wanted, wanted * M_PI / 180);
+  return 1;
+}
+
+/// Of a place that is farther than motions go, and would not be if it was in millimetres.
+static int tell_millimetres(FILE *out, const cav_problem *p, const cav_term *term) {
+  const cav_sensor *s = &term->sensor;
+  char name[NAME];
+  double most = 0;
+  if (term->quantity != CAV_QUANTITY_SENSOR || !term->target || term->nwaypoint) return 0;
+  if (s->type != CAV_SENSOR_FRAMEPOS && s->type != CAV_SENSOR_SUBTREECOM) return 0;
+  for (int k = 0; k < s->dim; k++)
+    if ((term->component < 0 || term->component == k) && fabs(term->target[k]) > fabs(most)) most = term->target[k];
+  if (!(fabs(most) > far_away)) return 0;
+  fprintf(out, "note: %s wants a place at %g m: lengths are in m; %g mm are %g\n", called(p, term, name), most, most,
+          most / 1000);
+  return 1;
+}
+
+/// Of a touch that is asked for without a number: of none.
+static int tell_touch(FILE *out, const cav_problem *p, const cav_term *term) {
+  char name[NAME];
+  if (term->quantity != CAV_QUANTITY_SENSOR || term->sensor.type != CAV_SENSOR_TOUCH || term->target) return 0;
+  if (term->use == CAV_USE_RANGE || term->within > 0) return 0;
+  fprintf(out,
+          "note: %s has no target, which is 0 N: it is kept from touching. target=\"50\", in N, asks for a touch; "
+          "within=\"5\" or a constraint upper=\"0\" has it untouched\n",
+          called(p, term, name));
+  return 1;
+}
+
+/// Of a posture that puts a free body farther than motions go.
+static int tell_far_root(FILE *out, const cav_problem *p, const double *q, const char *which) {
+  for (int j = 0; j < p->model->njoint; j++) {
+    const cav_joint *joint = &p->model->joint[j];
+    if (joint->type != CAV_JOINT_FREE) continue;
+    for (int k = 0; k < 3; k++) {
+      if (!(fabs(q[joint->q + k]) > far_away)) continue;
+      fprintf(out, "note: the %s has '%.60s' at %c %g m: lengths are in m; %g mm are %g\n", which,
+              p->model->body[joint->body].name, "xyz"[k], q[joint->q + k], q[joint->q + k], q[joint->q + k] / 1000);
+      return 1;
+    }
+  }
+  return 0;
+}
+
+int cav_command_tell_units(FILE *out, const cav_problem *p) {
+  int n = tell_far_root(out, p, p->q_start, "start");
+  if (memcmp(p->q_start, p->q_goal, (size_t)p->model->nq * sizeof *p->q_goal))
+    n += tell_far_root(out, p, p->q_goal, "goal");
+  for (int i = 0; i < p->nterm; i++) {
+    const cav_term *term = &p->term[i];
+    n += tell_degrees(out, p, term) + tell_millimetres(out, p, term) + tell_touch(out, p, term);
+  }
+  return n;
 }

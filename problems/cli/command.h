@@ -160,6 +160,12 @@ int cav_command_missed(const cav_result *result, const cav_explanation *explanat
 /// Tells how many strategies a folder's solve tried, and in how many seconds, where they are more than one. tried.c.
 void cav_command_tell_tried(FILE *out, const char *folder);
 
+/// Says that a duration, or at 0 s an end that may move, would do what a problem asks for, each line after a text. tried.c.
+void cav_command_tell_would_do(FILE *out, const char *before, const cav_problem *problem, double seconds);
+
+/// The same of what the solve of a folder found for a problem that it did not solve. tried.c.
+void cav_command_tell_diagnoses(FILE *out, const char *folder, const cav_problem *problem);
+
 /// Time of a clock, s: CLOCK_MONOTONIC, CLOCK_PROCESS_CPUTIME_ID.
 double cav_command_clock(clockid_t clock);
 
@@ -194,6 +200,10 @@ int cav_command_tell_postures(FILE *out, const cav_problem *problem);
 
 /// Says of a <goal> that no term asks for where a term wants another reading at the end; their number. postures.c.
 int cav_command_tell_goal(FILE *out, const cav_problem *problem);
+
+/// Says of numbers that are likely to be of another unit (degrees, millimetres), and of a touch without a target; their
+/// number. asked.c.
+int cav_command_tell_units(FILE *out, const cav_problem *problem);
 
 /// Prints what terms with a target read at the start and at the goal, and what they want: a line each. asked.c.
 cav_status cav_command_print_asked(const cav_problem *problem, cav_error *error);

@@ -561,8 +561,10 @@ void cav_command_tell_step(FILE *out, const cav_problem *p) {
     fprintf(out, "note: a free body falls by %.3g m in one step of %g s: durations and steps are in s\n", fall,
             p->timestep);
   if (p->duration / p->timestep > MANY_KNOTS)
-    fprintf(out, "note: %g s in steps of %g s are %.0f knots, %.3g GB at least: durations and steps are in s\n",
-            p->duration, p->timestep, p->duration / p->timestep + 1, bytes_of(p) / 1e9);
+    fprintf(
+        out,
+        "note: %g s in steps of %g s are %.0f knots, %.3g GB at least: durations and steps are in s; %g ms are %g\n",
+        p->duration, p->timestep, p->duration / p->timestep + 1, bytes_of(p) / 1e9, p->duration, p->duration / 1000);
 }
 
 static cav_status print_problem(const cav_problem *p, int all, cav_error *error) {
@@ -574,6 +576,7 @@ static cav_status print_problem(const cav_problem *p, int all, cav_error *error)
          : p->close_at_rest ? "at rest after the last knot"
                             : "open after the last knot");
   cav_command_tell_step(stdout, p);
+  cav_command_tell_units(stdout, p);
   cav_command_tell_equalities(stdout, p);
   cav_command_tell_postures(stdout, p);
   cav_command_tell_goal(stdout, p);
