@@ -131,6 +131,14 @@ horizon=
 asked '<sensor name="load" type="touch" body="rod" target="20" within="5" at="end" weight="1"/>'
 says "touch of rod to 20 at 1 s; to be met within 5 N"
 
+# geoms and actuators without a name: what they are, and where, to be found in the file
+sed 's|<start/>|<scene><geom type="box" size=".3 .3 .05" pos="2 0 .15"/></scene>&|' asked.xml >nameless.xml
+brief nameless.xml
+check "a geom of the world" grep -qE "^impossible: the start: geom 'box' is [0-9.]+ mm inside 'geom [0-9] of world \(box 0.3 0.3 0.05 at 2 0 0.15\)'" out
+sed 's/ ctrlrange="-1 1"//' model.xml >unlimited.xml
+brief unlimited.xml
+says "the first is number 0, 'actuator 1 (of joint 'pivot')'): a plan may take any force"
+
 # --- joints: what a positive change moves where ---
 
 line() { sed -n "s/^$1  *[a-z]* .*  + \(.*\)/\1/p" out; }

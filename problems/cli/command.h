@@ -9,6 +9,7 @@
 #include "cavort/result.h"
 #include "cavort/solve.h"
 #include "exit_status.h"
+#include "objects.h"
 
 enum { CAV_COMMAND_IPOPT = 32, CAV_COMMAND_SETTINGS = 32, CAV_COMMAND_PUSHES = 16 };
 
@@ -189,7 +190,7 @@ cav_status cav_command_print_stance(const cav_problem *problem, const char *name
 
 /// The names of the geoms of a pair, of the one that moves and of the one that it is in: where one is of the world, that. Returns
 /// the latter. stance.c.
-int cav_command_pair(const cav_model *model, int pair, char moves[CAV_GEOM_LABEL], char stands[CAV_GEOM_LABEL]);
+int cav_command_pair(const cav_model *model, int pair, char moves[CAV_WORDS], char stands[CAV_WORDS]);
 
 /// The contact with the least distance, NULL: there is none. stance.c.
 const cav_contact *cav_command_deepest(const cav_state *state);

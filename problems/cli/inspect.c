@@ -334,7 +334,8 @@ static void print_actuators(const cav_model *m) {
     int before = 0, after = 0;
     for (int k = 0; why && k < m->nu; k++) *(k < i ? &before : &after) += cav_actuator_unplannable(m, k) == why;
     if (!why || before) continue;
-    printf("  not with '%.60s'", m->actuator[i].name);
+    char words[CAV_WORDS];
+    printf("  not with '%.100s'", cav_actuator_words(m, i, words));
     if (after > 1) printf(" and %d more", after - 1);
     printf(": %s\n", why);
   }

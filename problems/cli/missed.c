@@ -41,6 +41,7 @@ static void suggest(const cav_problem *p, char *text, size_t size) {
 
 /// How far a motion is from the ends of what actuators and joints can do, where no multiplier speaks of a limit.
 static void tell_room(const cav_problem *p, const cav_trajectory *motion, char *text, size_t size) {
+  char words[CAV_WORDS];
   const cav_model *m = p->model;
   cav_error ignored = {0};
   cav_forces *forces = cav_forces_new(m, motion, &p->contact, p->close_at_rest, &ignored);
@@ -66,8 +67,8 @@ static void tell_room(const cav_problem *p, const cav_trajectory *motion, char *
         snprintf(text + n, size - (size_t)n,
                  " and actuators do nothing: where all stands still nothing leads on, which <swing> in <guess> breaks");
   else if (of >= 0)
-    n += snprintf(text + n, size - (size_t)n, ": actuators give at most %.2g %% of their limits ('%.40s' at %.3g s)",
-                  100 * most, m->actuator[of].name, at * motion->timestep);
+    n += snprintf(text + n, size - (size_t)n, ": actuators give at most %.2g %% of their limits ('%.100s' at %.3g s)",
+                  100 * most, cav_actuator_words(m, of, words), at * motion->timestep);
   if (joint >= 0 && (size_t)n < size)
     snprintf(text + n, size - (size_t)n, ", the nearest end of a range is %.2g %s off ('%.40s')", fmax(near, 0),
              m->joint[joint].type == CAV_JOINT_HINGE ? "rad" : "m", m->joint[joint].name);

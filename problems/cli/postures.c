@@ -52,10 +52,10 @@ static int tell_depth(FILE *out, const cav_problem *p, int start) {
   const cav_contact *deepest = state ? cav_command_deepest(state) : NULL;
   const int deep = deepest && -deepest->dist > CAV_TOLERANCE_PENETRATION;
   if (deep) {
-    char moves[CAV_GEOM_LABEL], stands[CAV_GEOM_LABEL];
+    char moves[CAV_WORDS], stands[CAV_WORDS];
     const int still = cav_command_pair(m, deepest->pair, moves, stands);
     const cav_term *asked = start ? NULL : asks_for_goal(p);
-    fprintf(out, "note: the %s has geom '%.48s' %.3g mm inside '%.48s', and a certificate allows %g: ",
+    fprintf(out, "note: the %s has geom '%.100s' %.3g mm inside '%.100s', and a certificate allows %g: ",
             start ? "start" : "goal", moves, -1e3 * deepest->dist, stands, 1e3 * CAV_TOLERANCE_PENETRATION);
     if (asked)
       fprintf(out, "'%.60s' asks for it at the end and may not be met. ", asked->name ? asked->name : "posture");
