@@ -108,7 +108,7 @@ static void print_wanted(const cav_term *term, const cav_term_report *r, char *t
     snprintf(text, size, "%.4g", r->wanted);
 }
 
-/// What a report's component is off by itself; that of a vector is less than its length, by which it is judged.
+/// What a report's component is off by itself; that of a vector is less than its length, to which its tolerance is.
 static double own_off(const cav_term *term, const cav_term_report *r) {
   const int vector = term->quantity == CAV_QUANTITY_SENSOR && term->component < 0 && term->sensor.dim > 1;
   const double own = fabs(r->got - r->wanted);
