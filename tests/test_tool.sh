@@ -590,10 +590,10 @@ slip 0 "touch of foot to 20" '<sensor name="tread" type="touch" geom="foot" targ
 check "one with a target is not told" sh -c '! grep -q "has no target" both'
 sed 's|<cost>|<limits effort="80"/>&|' hop.xml >units.xml
 run 2 inspect units.xml
-says err "attribute 'effort': expected a fraction of the limits of actuators, above 0, up to 1, got 80; 80 % are 0.8"
+says err "attribute 'effort': expected a fraction of the limits of actuators, above 0, at most 1, got 80; 80 % are 0.8"
 sed 's|<cost>|<limits torque="80"/>&|' hop.xml >units.xml
 run 2 inspect units.xml
-says err "attribute 'torque': not known here; <limits> has effort, margin"
+says err "attribute 'torque': not known here; remove it, or take one that <limits> has: effort, margin"
 # a body of the scene that was meant to be moved
 sed 's|<horizon|<scene><body name="crate" pos="2 0 .2"><geom type="box" size=".1 .1 .1"/></body></scene>&|' hop.xml >crate.xml
 sed 's|<goal key="stand" height="floor"/>|<goal key="stand"><root joint="crate" pos="3 0 .2"/></goal>|' crate.xml >units.xml

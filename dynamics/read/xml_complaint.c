@@ -313,7 +313,8 @@ void cav_xml_unknown_attribute(cav_xml_source *s, int line, const cav_xml_elemen
     for (; known < n && known < 63; known++) names[known] = a[known].name;
     names[known] = NULL;
     list_names(list, sizeof list, names);
-    cav_xml_source_fail(s, CAV_BAD_INPUT, line, rule->name, name, "not known here; <%s> has %s", rule->name, list);
+    cav_xml_source_fail(s, CAV_BAD_INPUT, line, rule->name, name,
+                        "not known here; remove it, or take one that <%s> has: %s", rule->name, list);
   } else
     cav_xml_source_fail(s, CAV_BAD_INPUT, line, rule->name, name, "not known here, the element has none; remove it");
 }

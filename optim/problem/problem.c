@@ -585,11 +585,11 @@ static cav_status read_limits(const cav_problem_reader *reader) {
   const cav_xml_node *node = cav_problem_child(reader->root, "limits");
   if (!node) return CAV_OK;
   cav_status status = cav_problem_real(reader, node, "effort", DBL_MIN, 1, &reader->problem->effort_limit);
-  if (status && cav_xml_real(node, "effort", 0) > 1 && cav_xml_real(node, "effort", 0) <= 100)
+  const double effort = cav_xml_real(node, "effort", 0), least_percent = 5;
+  if (status && effort >= least_percent && effort <= 100)
     return cav_xml_fail(reader->error, node, "effort",
-                        "expected a fraction of the limits of actuators, above 0, up to 1, got %g; %g %% are %g",
-                        cav_xml_real(node, "effort", 0), cav_xml_real(node, "effort", 0),
-                        cav_xml_real(node, "effort", 0) / 100);
+                        "expected a fraction of the limits of actuators, above 0, at most 1, got %g; %g %% are %g",
+                        effort, effort, effort / 100);
   return status ? status : cav_problem_real(reader, node, "margin", 0, DBL_MAX, &reader->problem->limit_margin);
 }
 
