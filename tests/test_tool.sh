@@ -603,6 +603,15 @@ sed 's|<sensor name="apex"[^>]*>|<sensor type="framepos" body="crate" target="3 
 run 1 inspect units.xml
 says out "Give its <body> a <freejoint/>, or a joint, if it is to be moved"
 
+# a jump that legs do not have the strength for, solved all the same: explain begins with it
+cat >house.xml <<TEXT
+<problem name="house" model="$root/problems/models/hopper.xml"><horizon duration="1" timestep=".05"/><start height="floor"><joint name="knee" degrees="60"/></start>
+<cost><sensor name="over" type="framepos" body="torso" component="z" target="10" at="0.5" weight="9"/></cost></problem>
+TEXT
+run 1 solve house.xml --force --strategies 1 --threads 1 -q -o house
+run 1 explain house
+check "a jump too high" grep -qE "^impossible: 'over' wants body 'torso' at z 10 .*, too high to jump: it takes .* J from the ground, and one push-off .* gives at most [0-9]+ J, for z 3" out
+
 # a ball that is meant in the air: what brings it down is told, and what leaves it there
 cat >toss.xml <<'END'
 <problem name="toss" model="monopod.xml"><scene><body name="ball" pos="2 0 1.2"><freejoint name="ball"/><geom type="sphere" size=".1"

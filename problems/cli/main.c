@@ -121,7 +121,8 @@ static int help(const cav_command_line *line);
 
 static const cav_manual_command commands[] = {
     {"inspect", "MODEL|PROBLEM",
-     "say what a model or a problem holds, what it runs and what it leaves out; of a problem first whether something "
+     "say what a model or a problem holds (--all: what it runs and leaves out, too); of a problem first whether "
+     "something "
      "proves it\n"
      "  impossible, and all that looks wrong with it: the way to check a file before it is solved",
      cav_command_inspect, OPTION_MODEL | OPTION_FLOATING | OPTION_ALL | OPTION_SET},
