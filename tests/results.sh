@@ -97,7 +97,7 @@ absent() {
       model=problems/models/humanoid.xml
       [ $when = declared ] && model=$old/declared.xml
       echo "Memory of a state, cavort inspect: $when"
-      "$build/problems/cavort" inspect "$model" | sed -n '/memory of a state/,/the whole/p' | sed 1d
+      "$build/problems/cavort" inspect "$model" --all | sed -n '/memory of a state/,/the whole/p' | sed 1d
     done
   } >"$out/absent.txt"
 }

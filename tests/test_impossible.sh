@@ -152,5 +152,23 @@ asks "$models/humanoid.xml" "duration='3' timestep='.025'" "friction (0.8) canno
 <start key="stand" height="floor"/><goal key="stand" height="floor"><root pos="40 0 1"/></goal><cost><posture dofs="all" at="end" weight="900"/></cost>
 E2
 
+# of several bounds of one thing the tightest, once
+once() {
+  "$cavort" inspect "$1" >out 2>&1
+  [ "$(grep -c impossible out)" = 1 ] && head -n 1 out | grep -qF -- "$2" && return
+  failed=$((failed + 1))
+  echo "failed: once '$2':"
+  grep impossible out
+}
+echo '<problem name="p" model="trolley.xml"><horizon duration="2" timestep=".02" close="open"/><start/><cost><posture name="far" joint="rail"
+qpos="10" at="end" weight="900"/></cost></problem>' >far.xml
+once far.xml "at full effort it comes 3.06 m far in 2 s"
+echo '<problem name="p" model="rod.xml"><horizon duration="4" timestep=".05"/><start/><goal><joint name="pivot" pos="3.1416"/></goal><cost>
+<posture dofs="all" at="end" weight="900"/></cost></problem>' >up.xml
+once up.xml "it takes at least 10.7 s"
+echo "<problem name='p' model='$models/hopper.xml'><horizon duration='1' timestep='.025'/><start height='floor'><joint name='knee' degrees='60'/></start>
+<cost><sensor name='aside' type='framepos' body='torso' component='y' target='0.5' at='end' weight='900'/></cost></problem>" >side.xml
+once side.xml "no joint moves it along y"
+
 echo "$n problems, $failed failed"
 [ "$failed" = 0 ] && [ "$n" -ge 12 ]

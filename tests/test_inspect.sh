@@ -1,5 +1,6 @@
 #!/bin/sh
-# What inspect says of a problem before it is solved: which terms count, where start and goal touch and are too deep, which way joints move.
+# What inspect says of a problem before it is solved: which terms count, what start and goal have of what is asked, what excludes each
+# other, where start and goal touch and are too deep, which way joints move.
 # Usage: test_inspect.sh CAVORT SOURCE_ROOT
 . "$(dirname "$0")/command.sh"
 
@@ -7,7 +8,7 @@
 inspected() {
   wanted=$1
   shift
-  run "$wanted" inspect "$@"
+  run "$wanted" inspect --all "$@"
 }
 not_said() { check "does not say: $1" sh -c '! grep -qF -- "$1" out' sh "$1"; }
 
@@ -41,6 +42,86 @@ says out "slip of loaded contacts of body box; these may slide by 0.2 m/s"
 says out "  must be           'level': framequat of box to no rotation at 1 s; to be met within 1e-06 rad"
 check "a name that is the element's is not repeated" grep -q "^  weight 1000       gap of" out
 
+# --- brief: what is asked beside what start and goal have; what excludes each other; what is open, and never measured ---
+
+brief() {
+  "$cavort" inspect "$@" >out 2>err
+  status=$?
+}
+# row NAME START GOAL WANTED: of the table of readings
+row() { check "row: $*, not '$(grep -F "  $1" out | tail -n 1)'" grep -qxE "  $1 +$2 +$3 +$4" out; }
+brief terms.xml
+check "brief: status $status" [ "$status" -eq 0 ]
+check "brief is short: $(wc -l <out) lines" [ "$(wc -l <out)" -lt 40 ]
+check "running costs in a line" grep -q "^  running costs by weight: effort 1, joint velocity 0.05, " out
+says out "  goal   no <goal>: the goal posture is the start"
+says out "  weight 900        'final': posture of all dofs to the goal at 1 s; to be met within 0.1 rad, 0.03 m (usual)"
+row "'near' z, m" -1.9 -1.9 -1.9
+row "'soft', N" - - 0
+row "'level', rad" "0 off" "0 off" "0 off"
+row "'hint', m" "0 0 1.5" "0 0 1.5" "0 0 1.5"
+not_said "an evaluation of the inverse"
+says out "--all: joints, places of bodies"
+check "the verdict is the last line" [ "$(tail -n 1 out)" = "nothing proves it impossible: cavort solve terms.xml" ]
+brief model.xml
+check "of a model what it holds" grep -q "^pivot  *hinge" out
+not_said "an evaluation of the inverse"
+# asked TEXT: the problem with these terms; HORIZON and GOAL by variables
+asked() {
+  echo "<problem name='asked' model='model.xml'><horizon duration='1' timestep='.02' $horizon/><start/>$goal<cost>$1</cost></problem>" >asked.xml
+  brief asked.xml
+}
+horizon= goal=
+asked '<sensor name="fast" type="framelinvel" body="rod" target="1 0 0" at=".5" weight="1"/>
+<sensor name="slow" type="framelinvel" body="rod" target="0 0 0" from=".4" to=".6" weight="1"/>'
+check "two speeds at one time: status $status" [ "$status" -eq 1 ]
+check "they exclude each other" sh -c 'head -n 1 out | grep -qF "impossible: '"'fast' wants a framelinvel of body 'rod' at 0.5 s to be 1 0 0, but 'slow' wants 0 0 0 then"'"'
+asked '<sensor name="fast" type="framelinvel" body="rod" target="1 0 0" at=".5" weight="1"/>
+<sensor name="slow" type="framelinvel" body="rod" target="0 0 0" at=".6" weight="1"/>'
+check "at two times they do not" [ "$status" -eq 0 ]
+asked '<sensor name="turned" type="framequat" body="box" target="0.7071 0 0 0.7071" at=".5" weight="1"/>
+<sensor name="level" type="framequat" body="box" from=".4" to=".6" within=".1" weight="1"/>'
+check "two orientations: status $status" [ "$status" -eq 1 ]
+row "'turned', rad" "1.571 off" "1.571 off" "0 off"
+asked '<sensor name="turned" type="framequat" body="box" target="0.7071 0 0 0.7071" at=".5" weight="1" within="any"/>
+<sensor name="level" type="framequat" body="box" from=".4" to=".6" within=".1" weight="1"/>'
+check "one that is reported only excludes nothing" [ "$status" -eq 0 ]
+asked '<sensor name="apart" type="framepos" body="box" reftype="xbody" refname="rod" component="x" target="2" at=".5" weight="1"/>
+<sensor name="near" type="framepos" body="box" reftype="xbody" refname="rod" component="x" target="1" at=".5" weight="1"/>'
+check "two places in a frame that moves: status $status" [ "$status" -eq 1 ]
+# a goal that no term asks for, and a target at the end; one that is asked for
+goal='<goal><joint name="pivot" pos=".5"/></goal>'
+asked '<sensor name="swung" type="framezaxis" xbody="rod" target="1 0 0" at="end" weight="9"/>'
+says out "note: the goal disagrees with 'swung', which wants z 0 (within 0.1) at the end: the goal's posture has 0.878. It only leads the guess"
+not_said "no <goal>"
+asked '<sensor name="swung" type="framezaxis" xbody="rod" target="1 0 0" at="end" weight="9"/><posture dofs="all" at="end" weight="9"/>'
+says out "note: the goal disagrees with 'swung', which wants z 0 (within 0.1) at the end: the goal's posture, which 'posture' asks for, has 0.878 there"
+row "posture, farthest pivot, rad" 0 0.5 0.5
+asked '<sensor name="swung" type="framezaxis" xbody="rod" target="1 0 0" at=".5" weight="9"/>'
+not_said "disagrees"
+goal=
+# a base that a posture of joints leaves open
+brief "$root/problems/motions/squat-jump/problem.xml" --set "cost/final posture/@dofs=joints"
+says out "; leaves height, place and tilt of the base open"
+brief "$root/problems/motions/squat-jump/problem.xml"
+not_said "of the base open"
+# forces at an open end
+horizon='close="open"'
+asked '<sensor name="load" type="touch" body="rod" target="20" within="5" at="end" weight="1"/>'
+says out "never measured: a motion with close=\"open\" has no forces at its last knot; ask at 0.98 s, or before"
+says out "no term has to be met"
+horizon=
+asked '<sensor name="load" type="touch" body="rod" target="20" within="5" at="end" weight="1"/>'
+says out "touch of rod to 20 at 1 s; to be met within 5 N"
+
+# geoms and actuators without a name: what they are, and where, to be found in the file
+sed 's|<start/>|<scene><geom type="box" size=".3 .3 .05" pos="2 0 .15"/></scene>&|' asked.xml >nameless.xml
+brief nameless.xml
+check "a geom of the world" grep -qE "^impossible: the start: geom 'box' is [0-9.]+ mm inside 'geom [0-9] of world \(box 0.3 0.3 0.05 at 2 0 0.15\)'" out
+sed 's/ ctrlrange="-1 1"//' model.xml >unlimited.xml
+brief unlimited.xml
+says out "the first is number 0, 'actuator 1 (of joint 'pivot')'): a plan may take any force"
+
 # --- joints: what a positive change moves where ---
 
 line() { sed -n "s/^$1  *[a-z]* .*  + \(.*\)/\1/p" out; }
@@ -64,7 +145,7 @@ moved() {
   cat >moved.xml <<TEXT
 <problem name="moved" model="$1"><horizon duration="1"/><start/><goal ranges="clip"><joint name="$2" degrees="$3"/></goal></problem>
 TEXT
-  "$cavort" inspect moved.xml >moved.out 2>&1
+  "$cavort" inspect --all moved.xml >moved.out 2>&1
   # start and goal of that body: which way it went most
   places moved.out | awk -v body="$4" '$1 == body { for (k = 0; k < 3; k++) d[k] = $(5 + k) - $(2 + k); most = 0
     for (k = 1; k < 3; k++) if (d[k] * d[k] > d[most] * d[most]) most = k

@@ -105,6 +105,37 @@ const char *cav_geom_label(const cav_model *model, int geom, char label[CAV_GEOM
   return label;
 }
 
+const char *cav_geom_words(const cav_model *model, int geom, char words[CAV_WORDS]) {
+  static const struct {
+    const char *name;
+    int sizes;
+  } type[CAV_GEOM_TYPES] = {[CAV_GEOM_PLANE] = {"plane", 0},       [CAV_GEOM_SPHERE] = {"sphere", 1},
+                            [CAV_GEOM_CAPSULE] = {"capsule", 2},   [CAV_GEOM_ELLIPSOID] = {"ellipsoid", 3},
+                            [CAV_GEOM_CYLINDER] = {"cylinder", 2}, [CAV_GEOM_BOX] = {"box", 3},
+                            [CAV_GEOM_MESH] = {"mesh", 0},         [CAV_GEOM_HFIELD] = {"hfield", 0}};
+  const cav_geom *g = &model->geom[geom];
+  char label[CAV_GEOM_LABEL];
+  if (*g->name) return g->name;
+  int n = snprintf(words, CAV_WORDS, "%.64s (%s", cav_geom_label(model, geom, label), type[g->type].name);
+  for (int k = 0; k < type[g->type].sizes; k++) n += snprintf(words + n, (size_t)(CAV_WORDS - n), " %.3g", g->size[k]);
+  if (g->link == 0)
+    n += snprintf(words + n, (size_t)(CAV_WORDS - n), " at %.3g %.3g %.3g", g->pos[0] + 0.0, g->pos[1] + 0.0,
+                  g->pos[2] + 0.0);
+  snprintf(words + n, (size_t)(CAV_WORDS - n), ")");
+  return words;
+}
+
+const char *cav_actuator_words(const cav_model *model, int actuator, char words[CAV_WORDS]) {
+  const cav_actuator *a = &model->actuator[actuator];
+  const int joint = a->transmission == CAV_TRANSMISSION_JOINT;
+  if (*a->name) return a->name;
+  if (joint && *model->joint[a->target].name)
+    snprintf(words, CAV_WORDS, "actuator %d (of joint '%.60s')", actuator + 1, model->joint[a->target].name);
+  else
+    snprintf(words, CAV_WORDS, "actuator %d", actuator + 1);
+  return words;
+}
+
 const char *cav_object_name(const cav_model *model, cav_object_type type, int object) {
   int n;
   size_t stride;

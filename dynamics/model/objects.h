@@ -19,4 +19,13 @@ const char *cav_object_name(const cav_model *model, cav_object_type type, int ob
 /// Names of all n objects of a kind, a stride of bytes apart; NULL if there are none.
 const char *const *cav_object_names(const cav_model *model, cav_object_type type, int *n, size_t *stride);
 
+enum { CAV_WORDS = 128 }; ///< room for words about an object
+
+/// A geom for people who look for it in its file: its name, or where it has none "geom 1 of world (box 0.4 0.4 0.05 at 1 0 0.65)",
+/// the place of those of the world alone.
+const char *cav_geom_words(const cav_model *model, int geom, char words[CAV_WORDS]);
+
+/// An actuator: its name, or where it has none "actuator 2 (of joint 'knee')", counted from 1 in the order of the file.
+const char *cav_actuator_words(const cav_model *model, int actuator, char words[CAV_WORDS]);
+
 #endif

@@ -59,7 +59,9 @@ void cav_xml_source_fail(cav_xml_source *s, cav_status status, int line, const c
 
 // --- guessing names ---
 
-// edits that turn a into b, both cut at WORD_LIMIT characters; two letters that change places are one
+static int is_other(char a, char b) { return tolower((unsigned char)a) != tolower((unsigned char)b); }
+
+// edits that turn a into b, whatever their case, both cut at WORD_LIMIT characters; two letters that change places are one
 static int distance(const char *a, const char *b) {
   int edits[WORD_LIMIT + 1][WORD_LIMIT + 1];
   int n = (int)strnlen(a, WORD_LIMIT), m = (int)strnlen(b, WORD_LIMIT);
@@ -68,10 +70,10 @@ static int distance(const char *a, const char *b) {
       int *best = &edits[i][j];
       *best = i + j;
       if (!i || !j) continue;
-      *best = edits[i - 1][j - 1] + (a[i - 1] != b[j - 1]);
+      *best = edits[i - 1][j - 1] + is_other(a[i - 1], b[j - 1]);
       if (edits[i - 1][j] + 1 < *best) *best = edits[i - 1][j] + 1;
       if (edits[i][j - 1] + 1 < *best) *best = edits[i][j - 1] + 1;
-      if (i < 2 || j < 2 || a[i - 1] != b[j - 2] || a[i - 2] != b[j - 1]) continue;
+      if (i < 2 || j < 2 || is_other(a[i - 1], b[j - 2]) || is_other(a[i - 2], b[j - 1])) continue;
       if (edits[i - 2][j - 2] + 1 < *best) *best = edits[i - 2][j - 2] + 1;
     }
   }
@@ -240,6 +242,36 @@ static const synonym element_synonyms[] = {
     {"target", {"sensor"}},     {"keyframe", {"pose"}},   {"bound", {"constraint"}}, {"pos", {"sensor"}},
 };
 
+// words of attributes: sensors by what other programs call them
+static const synonym word_synonyms[] = {
+    {"frameposition", {"framepos"}},
+    {"bodyposition", {"framepos"}},
+    {"bodypos", {"framepos"}},
+    {"position", {"framepos"}},
+    {"pos", {"framepos"}},
+    {"place", {"framepos"}},
+    {"frameorientation", {"framequat"}},
+    {"framequaternion", {"framequat"}},
+    {"frameeuler", {"framequat"}},
+    {"orientation", {"framequat"}},
+    {"rotation", {"framequat"}},
+    {"quat", {"framequat"}},
+    {"com", {"subtreecom"}},
+    {"centerofmass", {"subtreecom"}},
+    {"centreofmass", {"subtreecom"}},
+    {"jointposition", {"jointpos"}},
+    {"jointangle", {"jointpos"}},
+    {"angle", {"jointpos"}},
+    {"jointvelocity", {"jointvel"}},
+    {"framelinearvelocity", {"framelinvel"}},
+    {"linearvelocity", {"framelinvel"}},
+    {"velocity", {"framelinvel"}},
+    {"frameangularvelocity", {"frameangvel"}},
+    {"angularvelocity", {"frameangvel"}},
+    {"contact", {"touch"}},
+    {"contactforce", {"touch"}},
+};
+
 // what names [n] of a table have in the place of a word that other files use, NULL: nothing
 static const char *synonym_of(const synonym *list, size_t length, const char *word, const void *names, int n,
                               size_t stride) {
@@ -274,8 +306,17 @@ void cav_xml_unknown_attribute(cav_xml_source *s, int line, const cav_xml_elemen
                         rule->name, under->name);
   else if (near)
     cav_xml_source_fail(s, CAV_BAD_INPUT, line, rule->name, name, "not known here; did you mean '%s'?", near);
-  else
-    cav_xml_source_fail(s, CAV_BAD_INPUT, line, rule->name, name, "not known here; remove it or check its spelling");
+  else if (n) {
+    const char *names[64];
+    char list[300];
+    int known = 0;
+    for (; known < n && known < 63; known++) names[known] = a[known].name;
+    names[known] = NULL;
+    list_names(list, sizeof list, names);
+    cav_xml_source_fail(s, CAV_BAD_INPUT, line, rule->name, name,
+                        "not known here; remove it, or take one that <%s> has: %s", rule->name, list);
+  } else
+    cav_xml_source_fail(s, CAV_BAD_INPUT, line, rule->name, name, "not known here, the element has none; remove it");
 }
 
 void cav_xml_unknown_element(cav_xml_source *s, int line, const cav_xml_element *parent,
@@ -307,7 +348,8 @@ void cav_xml_unknown_word(cav_xml_source *s, int line, const char *element, cons
                           const char *const *words, int n) {
   char list[200];
   list_names(list, sizeof list, words);
-  const char *near = cav_xml_nearest(value->text, words, n, sizeof *words);
+  const char *near = SYNONYM_OF(word_synonyms, value->text, words, n, sizeof *words);
+  if (!near) near = cav_xml_nearest(value->text, words, n, sizeof *words);
   cav_xml_source_fail(s, CAV_BAD_INPUT, line, element, value->rule->name, "expected one of: %s; got '%.60s'%s%s%s",
                       list, value->text, near ? "; did you mean '" : "", near ? near : "", near ? "'?" : "");
 }

@@ -41,6 +41,12 @@ static int read_number(const char **text, cav_xml_type type, double *number) {
   return 1;
 }
 
+// what to do about numbers that cannot be read
+static const char *how_to_write(const cav_xml_value *value, const char *else_this) {
+  return strchr(value->text, ',') ? "numbers stand apart by spaces, without commas, and have a decimal point"
+                                  : else_this;
+}
+
 static void read_numbers(cav_xml_source *s, int line, const char *element, cav_xml_value *value) {
   const cav_xml_attribute *rule = value->rule;
   char expected[64];
@@ -50,9 +56,8 @@ static void read_numbers(cav_xml_source *s, int line, const char *element, cav_x
   int count = 0;
   for (const char *p = value->text; *p; p++) count += !is_space(*p) && (p == value->text || is_space(p[-1]));
   if (count < rule->min || (rule->max && count > rule->max)) {
-    cav_xml_source_fail(s, CAV_BAD_INPUT, line, element, rule->name,
-                        "expected %s, got %d in '%.60s'; give the right number of values", expected, count,
-                        value->text);
+    cav_xml_source_fail(s, CAV_BAD_INPUT, line, element, rule->name, "expected %s, got %d in '%.60s'%s", expected,
+                        count, value->text, how_to_write(value, "give the right number of values"));
     return;
   }
   double *number = cav_xml_carve(s->reader->xml, sizeof(double) * (size_t)(count ? count : 1));
@@ -64,10 +69,10 @@ static void read_numbers(cav_xml_source *s, int line, const char *element, cav_x
   for (int i = 0; i < count; i++) {
     while (is_space(*p)) p++;
     if (!read_number(&p, rule->type, &number[i])) {
-      cav_xml_source_fail(s, CAV_BAD_INPUT, line, element, rule->name,
-                          "expected %s, got '%.*s'; write finite decimal %s", expected,
+      cav_xml_source_fail(s, CAV_BAD_INPUT, line, element, rule->name, "expected %s, got '%.*s'; %s", expected,
                           (int)strcspn(p, " \t\r\n") < 60 ? (int)strcspn(p, " \t\r\n") : 60, p,
-                          rule->type == CAV_XML_INT ? "whole numbers" : "numbers");
+                          how_to_write(value, rule->type == CAV_XML_INT ? "write finite decimal whole numbers"
+                                                                        : "write finite decimal numbers"));
       return;
     }
   }

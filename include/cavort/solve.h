@@ -424,8 +424,10 @@ typedef struct cav_term_report {
   double time;        ///< s, of the knot at which it is missed most; of the value missed most there:
   double wanted, got; ///< its target (of a range the nearest value allowed) and itself, in unit
   double off;         ///< distance: of a sensor's vector its length, of dofs the largest
-  double within;      ///< tolerance: the term's, or for goals at one time a usual one; infinite: told only
-  int met;            ///< off <= within
+  double
+      off_alone; ///< of the component that wanted and got are of: less than off where others of a vector are off, too
+  double within; ///< tolerance: the term's, or for goals at one time a usual one; infinite: told only
+  int met;       ///< off <= within
   char unit[16], what[64]; ///< unit of its numbers; name of what is measured
 } cav_term_report;
 

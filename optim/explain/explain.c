@@ -22,6 +22,7 @@
 #include "contradiction.h"
 #include "file.h"
 #include "math3.h"
+#include "objects.h"
 #include "problem_file.h"
 #include "transcription.h"
 
@@ -248,12 +249,12 @@ static const char *term_name(const cav_problem *p, int k) {
 
 /// What a sensor looks at: kind and name; "" where it is not of a body.
 static void tell_sensor(const cav_model *m, const cav_sensor *s, char *out, size_t size) {
-  char buffer[CAV_GEOM_LABEL];
+  char buffer[CAV_WORDS];
   int i = s->object;
   *out = 0;
   if (s->object_type == CAV_OBJECT_BODY || s->object_type == CAV_OBJECT_XBODY)
     snprintf(out, size, " of body '%.60s'", body_name(m, i, buffer));
-  if (s->object_type == CAV_OBJECT_GEOM) snprintf(out, size, " of geom '%.60s'", cav_geom_label(m, i, buffer));
+  if (s->object_type == CAV_OBJECT_GEOM) snprintf(out, size, " of geom '%.90s'", cav_geom_words(m, i, buffer));
   if (s->object_type == CAV_OBJECT_SITE)
     snprintf(out, size, " of site '%.60s'", or_number(m->site[i].name, "site", i, buffer));
   if (s->object_type == CAV_OBJECT_JOINT)
@@ -287,7 +288,7 @@ static void tell_term(const cav_problem *p, const cav_binding *row, char *out, s
 /// What a row is about, without its numbers.
 static void tell_subject(const inquiry *in, const cav_binding *row, char *out, size_t size) {
   const cav_model *m = in->model;
-  char a[CAV_GEOM_LABEL], b[CAV_GEOM_LABEL], dof[160];
+  char a[CAV_WORDS], b[CAV_WORDS], dof[160];
   switch (row->kind) {
     case CAV_BINDING_UNACTUATED:
       tell_dof(m, row->object, dof, sizeof dof);
@@ -297,8 +298,8 @@ static void tell_subject(const inquiry *in, const cav_binding *row, char *out, s
       const cav_actuator *actuator = &m->actuator[row->object];
       const char *body =
           actuator->transmission == CAV_TRANSMISSION_JOINT ? body_name(m, m->joint[actuator->target].body, b) : "";
-      snprintf(out, size, "%s of actuator '%.60s'%s%.60s%s", row->component > 0 ? "control" : "effort",
-               or_number(actuator->name, "actuator", row->object, a), *body ? " (body '" : "", body, *body ? "')" : "");
+      snprintf(out, size, "%s of actuator '%.90s'%s%.60s%s", row->component > 0 ? "control" : "effort",
+               cav_actuator_words(m, row->object, a), *body ? " (body '" : "", body, *body ? "')" : "");
       break;
     }
     case CAV_BINDING_JOINT:
@@ -315,8 +316,8 @@ static void tell_subject(const inquiry *in, const cav_binding *row, char *out, s
     case CAV_BINDING_PENETRATION:
     case CAV_BINDING_KINDS: {
       const cav_pair *pair = &m->pair[row->object];
-      snprintf(out, size, "penetration of geom '%.60s' into '%.60s'", cav_geom_label(m, pair->geom2, a),
-               cav_geom_label(m, pair->geom1, b));
+      snprintf(out, size, "penetration of geom '%.80s' into '%.80s'", cav_geom_words(m, pair->geom2, a),
+               cav_geom_words(m, pair->geom1, b));
       break;
     }
   }

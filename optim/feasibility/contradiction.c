@@ -1,5 +1,5 @@
-/// Targets that exclude each other: two of one thing at one knot, one at the start that the start does not have, one
-/// outside the range of its joint.
+/// Targets that exclude each other: two of one thing or of one reading at one knot, one at the start that the start does not
+/// have, one outside the range of its joint.
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -69,8 +69,128 @@ static void examine_range(cav_examination *e, const cav_requirement *r) {
   const double room = slack + cav_joint_stop(joint);
   if (!joint->limited || (r->low[0] <= joint->range[1] + room && r->high[0] >= joint->range[0] - room)) return;
   cav_requirement_words(e, r, what, sizeof what);
-  cav_impossible(e, CAV_CONDITION_RANGE, r, "Move the target into the range, or check the range in the model.",
-                 "%s, but its range is %.4g to %.4g", what, joint->range[0], joint->range[1]);
+  char cure[160] = "Move the target into the range, or check the range in the model.";
+  // a number that was meant in degrees
+  const double wanted = isinf(r->low[0]) ? r->high[0] : isinf(r->high[0]) ? r->low[0] : (r->low[0] + r->high[0]) / 2;
+  const double turned = wanted * M_PI / 180, edge = 0.1;
+  const int beyond = wanted < joint->range[0] - edge || wanted > joint->range[1] + edge;
+  if (joint->type == CAV_JOINT_HINGE && beyond && turned >= joint->range[0] && turned <= joint->range[1])
+    snprintf(cure, sizeof cure,
+             "Targets are in radians, whatever <compiler angle> of the model says: %.4g degrees are %.4g.", wanted,
+             turned);
+  cav_impossible(e, CAV_CONDITION_RANGE, r, cure, "%s, but its range is %.4g to %.4g", what, joint->range[0],
+                 joint->range[1]);
+}
+
+// ---------------------------------------------------------------- two of one reading
+
+/// What verification takes for the tolerance of a goal on a reading, where its term gives none; 0: none.
+static double usual_of(const cav_model *m, const cav_sensor *s) {
+  static const double rate = 0.3, ratio = 0.1;
+  const cav_sensor_stage stage = cav_sensor_rule_of(s->type)->stage;
+  if (s->type == CAV_SENSOR_FRAMEXAXIS || s->type == CAV_SENSOR_FRAMEYAXIS || s->type == CAV_SENSOR_FRAMEZAXIS)
+    return ratio;
+  if (stage == CAV_READS_VELOCITY) return s->type == CAV_SENSOR_SUBTREEANGMOM ? 0 : rate;
+  if (stage != CAV_READS_POSITION || s->type == CAV_SENSOR_MAGNETOMETER) return 0;
+  const int turns = s->object_type == CAV_OBJECT_JOINT && m->joint[s->object].type != CAV_JOINT_SLIDE;
+  return s->dim == 4 || turns ? CAV_WITHIN_ANGLE : CAV_WITHIN_LENGTH;
+}
+
+static int is_same_reading(const cav_sensor *a, const cav_sensor *b) {
+  return a->type == b->type && a->object_type == b->object_type && a->object == b->object && a->cutoff == b->cutoff &&
+         a->referred == b->referred &&
+         (!a->referred || (a->reference_type == b->reference_type && a->reference == b->reference));
+}
+
+/// Whether two terms on one reading, which is known there, exclude each other at a knot.
+static int excludes(const cav_examination *e, const cav_term *a, const cav_term *b, int knot) {
+  const cav_problem *p = e->problem;
+  const cav_sensor *s = &a->sensor;
+  const double usual = usual_of(e->model, s), time = knot * p->timestep, ta = cav_term_tolerance(p, a, usual),
+               tb = cav_term_tolerance(p, b, usual);
+  double one[CAV_SENSOR_DIM_MAX] = {1}, other[CAV_SENSOR_DIM_MAX] = {1}, way[3], square = 0;
+  const int vector = a->component < 0 && b->component < 0 && a->use != CAV_USE_RANGE && b->use != CAV_USE_RANGE;
+  if (isinf(ta) || isinf(tb) || (s->dim == 4 && !vector)) return 0;
+  if (a->target || s->dim < 4) cav_term_target(a, time, s->dim, one);
+  if (b->target || s->dim < 4) cav_term_target(b, time, s->dim, other);
+  if (s->dim == 4) {
+    cav_rotation_between(one, other, way);
+    return norm3(way) > ta + tb + slack;
+  }
+  for (int k = 0; k < s->dim; k++) {
+    if ((a->component >= 0 && a->component != k) || (b->component >= 0 && b->component != k)) continue;
+    const int ra = a->use == CAV_USE_RANGE, rb = b->use == CAV_USE_RANGE;
+    const double low = one[k] + (ra ? a->lower : 0), high = one[k] + (ra ? a->upper : 0);
+    const double least = other[k] + (rb ? b->lower : 0), most = other[k] + (rb ? b->upper : 0);
+    if (low - ta > most + tb + slack || least - tb > high + ta + slack) return 1;
+    square += (one[k] - other[k]) * (one[k] - other[k]);
+  }
+  return vector && sqrt(square) > ta + tb + slack;
+}
+
+/// What a term wants of its sensor at a knot, in numbers.
+static void tell_wanted(const cav_term *term, double time, char *out, size_t size) {
+  double x[CAV_SENSOR_DIM_MAX] = {1};
+  const int dim = term->sensor.dim;
+  if (term->use == CAV_USE_RANGE && isfinite(term->lower) && isfinite(term->upper))
+    snprintf(out, size, "%.4g to %.4g", term->lower, term->upper);
+  else if (term->use == CAV_USE_RANGE)
+    snprintf(out, size, "at %s %.4g", isinf(term->upper) ? "least" : "most",
+             isinf(term->upper) ? term->lower : term->upper);
+  else {
+    if (term->target || dim < 4) cav_term_target(term, time, dim, x);
+    size_t n = 0;
+    for (int k = 0; k < dim && n < size; k++)
+      if (dim == 4 || term->component < 0 || term->component == k)
+        n += (size_t)snprintf(out + n, size - n, "%s%.4g", n ? " " : "", x[k]);
+  }
+}
+
+/// Last knot at which a reading is measured: of forces that of a motion that closes at rest is the last one.
+static int last_measured(const cav_examination *e, const cav_sensor *s) {
+  const int late = cav_sensor_rule_of(s->type)->stage == CAV_READS_ACCELERATION;
+  return e->nknot - 1 - (late && (!e->problem->close_at_rest || e->problem->cycle.on));
+}
+
+static void examine_readings_of_two(cav_examination *e, int i, int k) {
+  const cav_term *a = &e->problem->term[i], *b = &e->problem->term[k];
+  int first, last, begin, end;
+  const cav_requirement at = {.term = i};
+  cav_requirement_window(e, a, &first, &last);
+  cav_requirement_window(e, b, &begin, &end);
+  if (begin > first) first = begin;
+  if (end < last) last = end;
+  if (last > last_measured(e, &a->sensor)) last = last_measured(e, &a->sensor);
+  for (int t = first; t <= last; t++) {
+    if ((t % cav_requirement_stride(e) && t != first && t != last) || !excludes(e, a, b, t)) continue;
+    char one[160], other[160], wants[80], but[80];
+    const double time = t * e->problem->timestep;
+    cav_requirement_sensor_words(e, a, t, one, sizeof one);
+    tell_wanted(a, time, wants, sizeof wants);
+    tell_wanted(b, time, but, sizeof but);
+    const int named = *b->name && strcmp(b->name, cav_quantity_rule_of(b->quantity)->name);
+    snprintf(other, sizeof other, "%s%.60s%s", named ? "'" : "", named ? b->name : "another term", named ? "'" : "");
+    cav_impossible(e, CAV_CONDITION_CONTRADICTION, &at, "Drop or loosen one of the two, or set them apart in time.",
+                   "%s to be %s, but %s wants %s then", one, wants, other, but);
+    return;
+  }
+}
+
+/// Whether the requirements of a term tell of its reading already.
+static int is_required(const cav_examination *e, int term) {
+  for (int i = 0; i < e->n; i++)
+    if (e->requirement[i].term == term) return 1;
+  return 0;
+}
+
+static void examine_same_readings(cav_examination *e) {
+  const cav_problem *p = e->problem;
+  for (int i = 0; i < p->nterm; i++) {
+    if (p->term[i].quantity != CAV_QUANTITY_SENSOR || is_required(e, i)) continue;
+    for (int k = i + 1; k < p->nterm; k++)
+      if (p->term[k].quantity == CAV_QUANTITY_SENSOR && is_same_reading(&p->term[i].sensor, &p->term[k].sensor))
+        examine_readings_of_two(e, i, k);
+  }
 }
 
 /// Whether a term asks for a place or an orientation that is read at the start and that no requirement tells: in a frame of
@@ -130,7 +250,7 @@ static void examine_start_readings(cav_examination *e) {
 /// A term speaks at many knots: one proof for each is enough.
 static int is_known(const cav_examination *e, const cav_requirement *r) {
   for (int i = 0; i < e->nfound; i++)
-    if (e->found[i].term == r->term) return 1;
+    if (e->found[i].said.term == r->term) return 1;
   return 0;
 }
 
@@ -142,6 +262,7 @@ cav_status cav_examine_contradictions(cav_examination *e) {
     for (int k = i - 1; k >= 0 && e->requirement[k].knot == r->knot && !is_known(e, r); k--)
       examine_pair(e, &e->requirement[k], r);
   }
+  examine_same_readings(e);
   examine_start_readings(e);
   return CAV_OK;
 }

@@ -305,7 +305,8 @@ static void examine_base(cav_examination *e, const cav_requirement *r) {
   if (needs.least <= can.largest + slack && needs.largest >= can.least - slack) return;
   cav_requirement_words(e, r, what, sizeof what);
   if (can.largest < slack && r->kind == CAV_REQUIRE_POINT && r->object == 0)
-    cav_impossible(e, CAV_CONDITION_DISTANCE, r, "Give its body a joint, or ask it of another body.",
+    cav_impossible(e, CAV_CONDITION_DISTANCE, r,
+                   "Give its <body> a <freejoint/>, or a joint, if it is to be moved; or ask it of another body.",
                    "%s, but it is fixed to the world, %.3g m off", what, needs.least);
   else if (can.largest < slack)
     cav_impossible(e, CAV_CONDITION_DISTANCE, r, "Move the target, or check the ranges of its joints.",

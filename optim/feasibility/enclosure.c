@@ -12,6 +12,7 @@
 #include "cavort/solve.h"
 #include "feasibility.h"
 #include "math3.h"
+#include "objects.h"
 
 enum { SIDE = 49 };                  // cells along each axis, the target's in the middle
 static const double cell_size = 0.7; // of the ball's radius: gaps between solids that touch are closed
@@ -156,11 +157,11 @@ static cav_status examine_geom(cav_examination *e, const cav_requirement *r, int
     ok = g.seen && g.queue;
     transform(start, e->start->link[r->object].pos, e->start->link[r->object].rotation, r->point);
     if (ok && fill(e, &g) && !is_among(&g, start)) {
-      char what[160], name[CAV_GEOM_LABEL];
+      char what[160], name[CAV_WORDS];
       cav_requirement_words(e, r, what, sizeof what);
       cav_impossible(e, CAV_CONDITION_SOLID, r, "Open a way to the target, or start inside.",
-                     "%s, but solids of the world enclose it, and geom '%.48s' does not fit between them", what,
-                     cav_geom_label(m, geom, name));
+                     "%s, but solids of the world enclose it, and geom '%.100s' does not fit between them", what,
+                     cav_geom_words(m, geom, name));
     }
   }
   free(g.wall), free(g.seen), free(g.queue);

@@ -224,6 +224,7 @@ static void examine_way(cav_examination *e, const supply *s, const cav_requireme
   cav_impossible(e, CAV_CONDITION_ENERGY, r, "More time, a nearer target, or stronger actuators.",
                  "%s, too far for the time: %.3g %s away, and actuators at full effort move it at most %.3g %s by then",
                  what, way, unit, can, unit);
+  cav_impossible_fraction(e, can / way);
 }
 
 // ---------------------------------------------------------------- how fast
@@ -271,6 +272,7 @@ static void examine_rate(cav_examination *e, const supply *s, int i) {
       e, CAV_CONDITION_ENERGY, &r, "More time, a lower speed, or stronger actuators.",
       "%s, too fast for the time: %.3g %s are asked for, and actuators at full effort bring it to %.3g at most", what,
       sqrt(needs), turns ? "rad/s" : "m/s", can);
+  cav_impossible_fraction(e, can / sqrt(needs));
 }
 
 // ---------------------------------------------------------------- how high
@@ -397,6 +399,7 @@ static cav_status examine_height(cav_examination *e, const supply *s, int first,
       e, CAV_CONDITION_ENERGY, r, "More time, a lower target, or stronger actuators.",
       "%s, too high for the actuators: it needs %.3g J more than the start has, they give at most %.3g J by then; %s",
       what, needs - has, can - has, time);
+  cav_impossible_fraction(e, isfinite(least) ? t / least : 1);
   return CAV_OK;
 }
 

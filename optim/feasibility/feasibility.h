@@ -22,6 +22,16 @@ typedef struct cav_requirement {
   double low[3], high[3]; ///< infinite where open; COORDINATE: the first alone
 } cav_requirement;
 
+/// A proof, and what tells it from others of the same thing.
+typedef struct cav_proof {
+  cav_impossibility said;
+  cav_requirement_kind kind; ///< of the requirement that cannot be met
+  int object;                ///< of it, -1: it has none
+  double fraction;           ///< bound over what is asked: the less, the tighter; 0: exact, or no number bounds it
+} cav_proof;
+
+enum { CAV_PROOFS = 32 }; ///< most that are looked for
+
 /// An examination in progress.
 typedef struct cav_examination {
   const cav_problem *problem;
@@ -33,7 +43,7 @@ typedef struct cav_examination {
   int n, room;
   cav_requirement *requirement; ///< [n] by knot, then by term
   int most, nfound;
-  cav_impossibility *found; ///< [most]
+  cav_proof *found; ///< [most]
 } cav_examination;
 
 /// Whether a motion has to begin at q_start with v_start; conditions that reckon from there on hold of no other.
@@ -70,6 +80,10 @@ void cav_requirement_sensor_words(const cav_examination *e, const cav_term *term
 /// A proof more, with its text in printf's manner; those beyond the room are dropped. feasibility.c.
 void cav_impossible(cav_examination *e, cav_condition condition, const cav_requirement *r, const char *cure,
                     const char *format, ...) __attribute__((format(printf, 5, 6)));
+
+/// The bound of the last proof over what is asked, where it is a number: of several proofs of one thing the tightest is
+/// told. feasibility.c.
+void cav_impossible_fraction(cav_examination *e, double fraction);
 
 /// Name of a joint, link or geom for messages. feasibility.c.
 const char *cav_name_or(const char *name, const char *kind, int i, char buffer[48]);

@@ -210,6 +210,7 @@ static cav_status examine_one(cav_examination *e, const cav_requirement *r) {
     cav_impossible(e, CAV_CONDITION_MOMENTUM, r, "Give the floor friction, more time, or something to push against.",
                    "%s, but nothing can push it there: there is no friction (%.3g), %.3g m short", what, s.friction,
                    off - way);
+  cav_impossible_fraction(e, way / off);
   return CAV_OK;
 }
 

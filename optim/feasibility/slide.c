@@ -84,6 +84,7 @@ static void tell(cav_examination *e, const cav_requirement *r, double way, doubl
   cav_impossible(e, CAV_CONDITION_ENERGY, r, "More time, or a stronger actuator.",
                  "%s, %.3g m from the start, but at full effort it comes %.3g m far in %.3g s at most", what, way, can,
                  time);
+  cav_impossible_fraction(e, can / way);
 }
 
 /// What is known of the model.
@@ -161,7 +162,7 @@ static void examine(cav_examination *e, const cav_requirement *r, const slides *
 
 cav_status cav_examine_slides(cav_examination *e) {
   const cav_model *m = e->model;
-  int known = 0, bounded = 0;
+  int known = 0, bounded = 0, before = e->nfound;
   if (!cav_start_is_given(e->problem) || e->n == 0 || !is_covered(m)) return CAV_OK;
   double *mass = malloc(4 * (size_t)m->nv * sizeof *mass);
   if (!mass) return CAV_NO_MEMORY;
@@ -170,7 +171,7 @@ cav_status cav_examine_slides(cav_examination *e) {
   cav_status status = find_masses(e, mass, &known);
   e->scratch->options = options;
   if (!status) status = cav_effort_of_dofs(e, s.force, &bounded);
-  for (int i = 0; i < e->n && known && bounded && !status && e->nfound == 0; i++) {
+  for (int i = 0; i < e->n && known && bounded && !status && e->nfound == before; i++) {
     const cav_requirement *r = &e->requirement[i];
     if (r->knot > 0 && (r->kind != CAV_REQUIRE_POINT || r->object > 0)) examine(e, r, &s);
   }

@@ -10,6 +10,7 @@
 #include "cavort/solve.h"
 #include "feasibility.h"
 #include "math3.h"
+#include "objects.h"
 
 static const double slack = 1e-3; // m
 
@@ -76,7 +77,7 @@ static double box_depth(const cav_examination *e, int geom, const cav_requiremen
 
 static void examine_point(cav_examination *e, const cav_requirement *r) {
   const cav_model *m = e->model;
-  char what[160], one[CAV_GEOM_LABEL], other[CAV_GEOM_LABEL];
+  char what[160], one[CAV_WORDS], other[CAV_WORDS];
   for (int p = 0; p < m->npair; p++) {
     int a = m->pair[p].geom1, b = m->pair[p].geom2, body = m->geom[a].link == r->object ? a : b, wall = a + b - body;
     if (m->geom[body].link != r->object || m->geom[wall].link != 0) continue;
@@ -86,8 +87,8 @@ static void examine_point(cav_examination *e, const cav_requirement *r) {
     if (radius < 0 || (depth < 0 && !exact) || !(depth + radius > CAV_TOLERANCE_PENETRATION + slack)) continue;
     cav_requirement_words(e, r, what, sizeof what);
     cav_impossible(e, CAV_CONDITION_SOLID, r, "Move the target out of the solid.",
-                   "%s, but there geom '%.48s' would be %.3g mm inside '%.48s'", what, cav_geom_label(m, body, one),
-                   1e3 * (depth + radius), cav_geom_label(m, wall, other));
+                   "%s, but there geom '%.100s' would be %.3g mm inside '%.100s'", what, cav_geom_words(m, body, one),
+                   1e3 * (depth + radius), cav_geom_words(m, wall, other));
     return;
   }
 }
@@ -96,7 +97,7 @@ static void examine_point(cav_examination *e, const cav_requirement *r) {
 static void examine_posture(cav_examination *e, const cav_state *state, const char *which) {
   const cav_model *m = e->model;
   const cav_contact *deepest = NULL;
-  char one[CAV_GEOM_LABEL], other[CAV_GEOM_LABEL];
+  char one[CAV_WORDS], other[CAV_WORDS];
   for (int i = 0; i < state->ncontact; i++)
     if (!deepest || state->contact[i].dist < deepest->dist) deepest = &state->contact[i];
   if (!deepest || -deepest->dist <= CAV_TOLERANCE_PENETRATION) return;
@@ -115,8 +116,8 @@ static void examine_posture(cav_examination *e, const cav_state *state, const ch
         "Change the posture: to stand on that, <root pos='X Y Z'/> with Z above it; height='floor' then lowers it "
         "there.";
   cav_impossible(e, CAV_CONDITION_SOLID, NULL, cure,
-                 "%s: geom '%.48s' is %.3g mm inside '%.48s', and a certificate allows %g", which,
-                 cav_geom_label(m, moves, one), -1e3 * deepest->dist, cav_geom_label(m, stands, other),
+                 "%s: geom '%.100s' is %.3g mm inside '%.100s', and a certificate allows %g", which,
+                 cav_geom_words(m, moves, one), -1e3 * deepest->dist, cav_geom_words(m, stands, other),
                  1e3 * CAV_TOLERANCE_PENETRATION);
 }
 

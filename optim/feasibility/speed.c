@@ -141,6 +141,8 @@ static void examine_joint(cav_examination *e, const rates *r, int j) {
             e, CAV_CONDITION_ENERGY, q, "More time, a nearer target, or a looser limit of speed.",
             "%s, too far for its speed: limits of speed leave %.4g to %.4g %s by then, from %.4g at the start", what,
             low, high, unit, start);
+        const double way = q->low[0] > high ? q->low[0] - start : start - q->high[0];
+        cav_impossible_fraction(e, (q->low[0] > high ? high - start : start - low) / way);
         return;
       }
       low = fmax(low, q->low[0]), high = fmin(high, q->high[0]);
@@ -174,6 +176,7 @@ static void tell_way(cav_examination *e, const cav_requirement *q, double way, d
   cav_requirement_words(e, q, what, sizeof what);
   cav_impossible(e, CAV_CONDITION_ENERGY, q, "More time, a nearer target, or a looser limit of speed.",
                  "%s, too far for its speed: %.3g m away, and limits of speed leave %.3g m by then", what, way, can);
+  cav_impossible_fraction(e, can / way);
 }
 
 static void examine_point(cav_examination *e, const rates *r, const cav_requirement *q) {

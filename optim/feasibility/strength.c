@@ -11,6 +11,7 @@
 
 #include "feasibility.h"
 #include "math3.h"
+#include "objects.h"
 #include "problem_file.h"
 #include "transcription.h"
 
@@ -215,7 +216,7 @@ static void tell(cav_examination *e, const bearing *b, const double *need, const
   const cav_model *m = e->model;
   const cav_term *held = &e->problem->term[term];
   const cav_requirement at = {.term = term, .knot = t};
-  char name[48], joint[48];
+  char name[CAV_WORDS], joint[48];
   double time = t * e->problem->timestep;
   int weak = weakest(b, left, m->nu), worst = 0;
   for (int d = 0; d < m->nv; d++)
@@ -234,11 +235,10 @@ static void tell(cav_examination *e, const bearing *b, const double *need, const
            part ? " of it" : " against gravity");
   if (weak >= 0)
     cav_impossible(e, CAV_CONDITION_STRENGTH, &at, "A stronger actuator, a lighter load, or a posture that needs less.",
-                   "posture '%.48s' cannot be held at %.4g s: with actuator '%.48s' at its limit of %.3g and all that "
+                   "posture '%.48s' cannot be held at %.4g s: with actuator '%.80s' at its limit of %.3g and all that "
                    "contacts can "
                    "give, %s",
-                   held->name, time, cav_name_or(m->actuator[weak].name, "actuator", weak, name), b->factor[weak],
-                   lacks);
+                   held->name, time, cav_actuator_words(m, weak, name), b->factor[weak], lacks);
   else
     cav_impossible(e, CAV_CONDITION_STRENGTH, &at, "A posture that stands, or one that is not held.",
                    "posture '%.48s' cannot be held at %.4g s: %s, which no actuator or contact can give", held->name,

@@ -179,6 +179,7 @@ static cav_status examine_one(cav_examination *e, const double *force, const cav
                  "%s, too high to jump: it takes %.3g J from the ground, and one push-off of all joints at full effort "
                  "over their whole ranges gives at most %.3g J, for z %.3g",
                  what, needs, has, high + s.support + below);
+  cav_impossible_fraction(e, high / height);
   return CAV_OK;
 }
 

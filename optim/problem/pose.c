@@ -12,6 +12,7 @@
 
 #include "file.h"
 #include "math3.h"
+#include "objects.h"
 #include "posture.h"
 #include "problem_file.h"
 #include "stand.h"
@@ -316,12 +317,12 @@ static cav_status note_lowered(const cav_problem_reader *reader, const cav_xml_n
       add_text(owner->lowered, sizeof owner->lowered, "<%s> lowers '%.60s' by %.3g m", node->rule->name, name, way);
       continue;
     }
-    char label[CAV_GEOM_LABEL], raise[60] = "";
+    char label[CAV_WORDS], raise[60] = "";
     // to the next millimetre; what lies a rounding deep in it is stopped by it
     if (up > 0) snprintf(raise, sizeof raise, ": %.3f m higher it is on that", ceil(1e3 * up - 1e-3) / 1e3);
     add_text(owner->buried, sizeof owner->buried,
-             "<%s> lowers '%.60s' by %.3g m, not stopped by '%.60s', inside which it begins%s", node->rule->name, name,
-             way, cav_geom_label(m, solid, label), raise);
+             "<%s> lowers '%.60s' by %.3g m, not stopped by '%.100s', inside which it begins%s", node->rule->name, name,
+             way, cav_geom_words(m, solid, label), raise);
   }
   return status;
 }

@@ -80,6 +80,10 @@ void cav_problem_free(cav_problem *problem) {
   if (problem) free_owner(problem->owner);
 }
 
+int cav_problem_has_goal(const cav_problem *problem) {
+  return ((const cav_problem_owner *)(const void *)problem)->goal;
+}
+
 const cav_xml_node *cav_problem_child(const cav_xml_node *node, const char *name) {
   const cav_xml_node *child = node ? node->child : NULL;
   while (child && strcmp(child->rule->name, name)) child = child->next;
@@ -145,7 +149,18 @@ static void refuse_name(const cav_problem_reader *reader, const cav_xml_node *no
       snprintf(hint, sizeof hint, ", of body '%.100s'", m->body[body].name);
     if (geom >= 0 && body == 0)
       snprintf(hint, sizeof hint, " in the world itself: put it into a <body name=\"%.60s\"> of its own", first);
+    const int fixed = type == CAV_OBJECT_JOINT && (other == CAV_OBJECT_BODY || other == CAV_OBJECT_XBODY)
+                          ? cav_object_find(m, CAV_OBJECT_BODY, first)
+                          : -1;
     if (!accepted && geom < 0) hint_of(near, first, names, n, stride, hint);
+    if (fixed > 0 && m->body[fixed].link == 0)
+      snprintf(hint, sizeof hint,
+               ", which is fixed to the world: <freejoint name=\"%.60s\"/> in its <body> lets it move", first);
+    const cav_joint *free = fixed > 0 && m->body[fixed].link ? &m->joint[m->link[m->body[fixed].link].joint] : NULL;
+    if (free && free->type == CAV_JOINT_FREE && *free->name)
+      snprintf(hint, sizeof hint, ": its free joint is called '%.60s'", free->name);
+    else if (free && free->type == CAV_JOINT_FREE)
+      snprintf(hint, sizeof hint, ": its free joint has no name, <freejoint name=\"%.60s\"/> gives one", first);
     cav_xml_fail(reader->error, node, attribute, "the model '%s' has no %s '%.100s', but %s %s of that name%s", m->name,
                  kind, first, strchr("aeiou", *given) ? "an" : "a", given, hint);
     return;
@@ -384,6 +399,7 @@ static cav_status read_ends(const cav_problem_reader *reader) {
   const cav_xml_node *start = cav_problem_child(reader->root, "start"), *goal = cav_problem_child(reader->root, "goal");
   cav_status status = cav_problem_pose(reader, start, p->q_start);
   p->free_start = cav_xml_bool(start, "free", 0);
+  reader->owner->goal = goal != NULL;
   // one that is free is brought into ranges by the solver
   if (!status && !p->free_start) status = check_ranges(reader, start, p->q_start);
   if (status) return status;
@@ -411,6 +427,11 @@ static cav_status read_limits(const cav_problem_reader *reader) {
   const cav_xml_node *node = cav_problem_child(reader->root, "limits");
   if (!node) return CAV_OK;
   cav_status status = cav_problem_real(reader, node, "effort", DBL_MIN, 1, &reader->problem->effort_limit);
+  const double effort = cav_xml_real(node, "effort", 0), least_percent = 5;
+  if (status && effort >= least_percent && effort <= 100)
+    return cav_xml_fail(reader->error, node, "effort",
+                        "expected a fraction of the limits of actuators, above 0, at most 1, got %g; %g %% are %g",
+                        effort, effort, effort / 100);
   return status ? status : cav_problem_real(reader, node, "margin", 0, DBL_MAX, &reader->problem->limit_margin);
 }
 

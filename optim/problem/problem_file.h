@@ -17,6 +17,7 @@ typedef struct cav_problem_owner {
   cav_problem problem;
   cav_model *model;
   cav_problem_block *block;
+  int goal;          ///< the file has a <goal>
   char lowered[400]; ///< what height="floor" brought far down; "": nothing
   char buried[400];  ///< what it brought out of a solid; "": nothing
 } cav_problem_owner;
@@ -59,6 +60,9 @@ extern const char *const cav_problem_styles[];
 /// Zeroed memory of the problem; NULL if there is none left. problem.c.
 void *cav_problem_alloc(cav_problem_owner *owner, size_t size);
 char *cav_problem_text(cav_problem_owner *owner, const char *text);
+
+/// Whether the file of a problem has a <goal>; else the goal posture is the start. problem.c.
+int cav_problem_has_goal(const cav_problem *problem);
 
 /// First child of that name, NULL if there is none; NULL node: NULL. problem.c.
 const cav_xml_node *cav_problem_child(const cav_xml_node *node, const char *name);

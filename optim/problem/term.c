@@ -406,11 +406,29 @@ static cav_status read_component(const cav_problem_reader *reader, const cav_xml
   return CAV_OK;
 }
 
+// three angles in the place of a quaternion: what it would be
+static cav_status refuse_angles(const cav_problem_reader *reader, const cav_xml_node *node, const double angle[3]) {
+  const int degrees = fmax(fabs(angle[0]), fmax(fabs(angle[1]), fabs(angle[2]))) > 2 * M_PI;
+  double quat[4] = {1, 0, 0, 0};
+  for (int i = 0; i < 3; i++) {
+    double axis[3] = {0}, rotation[4];
+    axis[i] = angle[i] * (degrees ? M_PI / 180 : 1);
+    quat_exp(rotation, axis);
+    quat_mul(quat, quat, rotation);
+  }
+  return cav_xml_fail(
+      reader->error, node, "target",
+      "expected 4 numbers, a quaternion w x y z, got 3; as angles in %s about x, then y, then z they are "
+      "%.4g %.4g %.4g %.4g",
+      degrees ? "degrees" : "radians", quat[0] + 0.0, quat[1] + 0.0, quat[2] + 0.0, quat[3] + 0.0);
+}
+
 // targets of a sensor: all of its values, or the one that counts
 static cav_status sensor_target(const cav_problem_reader *reader, const cav_xml_node *node, const cav_term *term,
                                 double *target) {
   const cav_xml_value *given = cav_xml_get(node, "target");
   int rotation = term->sensor.dim == 4, one = term->component >= 0 && !rotation, wanted = one ? 1 : term->sensor.dim;
+  if (rotation && given->count == 3) return refuse_angles(reader, node, given->number);
   if (given->count != wanted) {
     return cav_xml_fail(reader->error, node, "target", "expected %d number%s%s, got %d", wanted, wanted > 1 ? "s" : "",
                         one        ? ", of the component"
@@ -523,7 +541,8 @@ static cav_status read_touch(const cav_problem_reader *reader, const cav_xml_nod
   if (reader->model->body[term->body].link == 0 && term->quantity != CAV_QUANTITY_FORCE &&
       term->quantity != CAV_QUANTITY_EDGE_FORCE)
     return cav_xml_fail(reader->error, node, "body",
-                        "expected a body that moves (fixed ones for forces alone), got '%.80s'",
+                        "expected a body that moves (fixed ones for forces alone), got '%.80s'; <freejoint/> in its "
+                        "<body> lets it move",
                         cav_xml_text(node, "body", ""));
   return CAV_OK;
 }

@@ -7,6 +7,7 @@
 #include <math.h>
 #include <stdio.h>
 
+#include "objects.h"
 #include "verification.h"
 
 // limits of the input; 0 where there are none
@@ -82,19 +83,20 @@ void cav_verification_effort(const cav_verification *verification, int t, int ac
                              double *moment, const char *suffix, cav_metric *metric) {
   const cav_model *model = verification->model;
   const cav_actuator *a = model->actuator + actuator;
+  char words[CAV_WORDS];
   double range[2], scale;
   cav_verification_actuator_range(model, actuator, range, &scale);
   const double planned = verification->problem->effort_limit;
   range[0] *= planned, range[1] *= planned;
-  cav_metric_note(metric, fmax(range[0] - effort, effort - range[1]) / scale, t,
-                  "actuator %.60s (%d) at %.4g of %.4g .. %.4g%s", a->name, actuator, effort, range[0], range[1],
+  cav_metric_note(metric, fmax(range[0] - effort, effort - range[1]) / scale, t, "%s%.60s at %.4g of %.4g .. %.4g%s",
+                  *a->name ? "actuator " : "", cav_actuator_words(model, actuator, words), effort, range[0], range[1],
                   suffix);
   if (a->bias == CAV_BIAS_NONE || !input_range(a, range)) return;
   double input = servo_input(verification, actuator, effort, v, moment), most = fmax(fabs(range[0]), fabs(range[1]));
   plan_input(verification, a, range);
   cav_metric_note(metric, fmax(range[0] - input, input - range[1]) / (most > 0 ? most : 1), t,
-                  "servo %.60s (%d), control at %.4g of %.4g .. %.4g%s", a->name, actuator, input, range[0], range[1],
-                  suffix);
+                  "servo %.60s, control at %.4g of %.4g .. %.4g%s", cav_actuator_words(model, actuator, words), input,
+                  range[0], range[1], suffix);
 }
 
 double cav_verification_effort_scale(const cav_model *model, int actuator) {

@@ -21,6 +21,9 @@ static double within_limit(const cav_model *model, int actuator) {
   return isfinite(most) ? within_effort * most : 0;
 }
 
+// part of a vector's length from which a component of it is the whole
+static const double all_of_it = 0.999;
+
 // unit of a sensor's reading and the tolerance it has by default; 0: none, the quantity has no usual one
 static const char *sensor_unit(const cav_model *model, const cav_sensor *sensor, double *within) {
   *within = 0;
@@ -196,6 +199,9 @@ static void note_target(const cav_verification *verification, const cav_term *te
   r->got = x[worst];
   miss_of(term, x[worst], target[worst], &r->wanted);
   make_coordinate(verification, term, t, worst, r);
+  const int several = term->quantity == CAV_QUANTITY_SENSOR && term->component < 0 && term->sensor.dim > 1;
+  const double alone = fabs(r->got - r->wanted);
+  r->off_alone = several && alone < all_of_it * off ? alone : off;
   r->time = t * verification->h;
   describe(verification->model, term, worst, r, &usual);
   r->within = cav_term_tolerance(verification->problem, term, usual);
@@ -368,6 +374,20 @@ void cav_targets_list(const cav_verification *verification, const cav_term *term
   }
 }
 
+// a target that is missed, in words; of a vector what the worst component alone is off by, too, which the numbers are of
+static void tell_miss(const cav_term *term, const cav_term_report *r, char *text, size_t size) {
+  const char *component = r->off_alone < r->off ? strrchr(r->what, ' ') : NULL;
+  const int named = is_named(term), kind = component ? (int)(component - r->what) : (int)strlen(r->what);
+  const int n = snprintf(text, size, "'%.*s' by %.3g %s (within %.3g) at %.3g s:", named ? 60 : kind,
+                         named ? term->name : r->what, r->off, r->unit, r->within, r->time);
+  const size_t used = n < (int)size ? (size_t)n : size;
+  if (component)
+    snprintf(text + used, size - used, "%s alone by %.3g, wanted %.4g, got %.4g", component, r->off_alone, r->wanted,
+             r->got);
+  else
+    snprintf(text + used, size - used, " wanted %.4g, got %.4g", r->wanted, r->got);
+}
+
 void cav_targets_verdict(const cav_verification *verification, cav_term_report *report, double residual_cost,
                          cav_verdict *verdict) {
   const cav_problem *p = verification->problem;
@@ -390,10 +410,7 @@ void cav_targets_verdict(const cav_verification *verification, cav_term_report *
     if (isnan(r->off) || r->off / r->within > worst) {
       worst = isnan(r->off) ? INFINITY : r->off / r->within;
       const cav_term *term = &p->term[i];
-      const char *name = is_named(term) ? term->name : r->what;
-      snprintf(verdict->missed, sizeof verdict->missed,
-               "'%.60s' by %.3g %s (within %.3g) at %.3g s: wanted %.4g, got %.4g", name, r->off, r->unit, r->within,
-               r->time, r->wanted, r->got);
+      tell_miss(term, r, verdict->missed, sizeof verdict->missed);
     }
   }
   verdict->missed_most = worst;

@@ -62,6 +62,7 @@ void cav_command_free(cav_command_scene *scene) {
 
 void cav_command_warn_efforts(const cav_model *model, FILE *out) {
   int n = 0, first = -1;
+  char words[CAV_WORDS];
   for (int i = 0; i < model->nu; i++) {
     double range[2];
     cav_actuator_effort_range(model, i, range);
@@ -75,9 +76,9 @@ void cav_command_warn_efforts(const cav_model *model, FILE *out) {
           n == model->nu ? "no actuator has a limit of effort" : "some actuators have no limit of effort");
   fprintf(
       out,
-      "%d of %d, the first is number %d, '%.60s'): a plan may take any force of %s; give a forcerange, the joint an "
+      "%d of %d, the first is number %d, '%.100s'): a plan may take any force of %s; give a forcerange, the joint an "
       "actuatorfrcrange, or a motor a ctrlrange\n",
-      n, model->nu, first, model->actuator[first].name, n == 1 ? "it" : "them");
+      n, model->nu, first, cav_actuator_words(model, first, words), n == 1 ? "it" : "them");
 }
 
 void cav_command_tell_asymmetry(const cav_problem *problem, FILE *out) {

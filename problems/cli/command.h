@@ -9,6 +9,7 @@
 #include "cavort/result.h"
 #include "cavort/solve.h"
 #include "exit_status.h"
+#include "objects.h"
 
 enum { CAV_COMMAND_IPOPT = 32, CAV_COMMAND_SETTINGS = 32, CAV_COMMAND_PUSHES = 16 };
 
@@ -160,6 +161,12 @@ int cav_command_missed(const cav_result *result, const cav_explanation *explanat
 /// Tells how many strategies a folder's solve tried, and in how many seconds, where they are more than one. tried.c.
 void cav_command_tell_tried(FILE *out, const char *folder);
 
+/// Says that a duration, or at 0 s an end that may move, would do what a problem asks for, each line after a text. tried.c.
+void cav_command_tell_would_do(FILE *out, const char *before, const cav_problem *problem, double seconds);
+
+/// The same of what the solve of a folder found for a problem that it did not solve. tried.c.
+void cav_command_tell_diagnoses(FILE *out, const char *folder, const cav_problem *problem);
+
 /// Time of a clock, s: CLOCK_MONOTONIC, CLOCK_PROCESS_CPUTIME_ID.
 double cav_command_clock(clockid_t clock);
 
@@ -183,7 +190,7 @@ cav_status cav_command_print_stance(const cav_problem *problem, const char *name
 
 /// The names of the geoms of a pair, of the one that moves and of the one that it is in: where one is of the world, that. Returns
 /// the latter. stance.c.
-int cav_command_pair(const cav_model *model, int pair, char moves[CAV_GEOM_LABEL], char stands[CAV_GEOM_LABEL]);
+int cav_command_pair(const cav_model *model, int pair, char moves[CAV_WORDS], char stands[CAV_WORDS]);
 
 /// The contact with the least distance, NULL: there is none. stance.c.
 const cav_contact *cav_command_deepest(const cav_state *state);
@@ -191,6 +198,23 @@ const cav_contact *cav_command_deepest(const cav_state *state);
 /// Tells of a start that is given in the air, at rest and held by nothing, and of a goal, or a start that is found, deep inside
 /// something, a line each; their number. postures.c.
 int cav_command_tell_postures(FILE *out, const cav_problem *problem);
+
+/// Says of a <goal> that no term asks for where a term wants another reading at the end; their number. postures.c.
+int cav_command_tell_goal(FILE *out, const cav_problem *problem);
+
+/// Says of numbers that are likely to be of another unit (degrees, millimetres), and of a touch without a target; their
+/// number. asked.c.
+int cav_command_tell_units(FILE *out, const cav_problem *problem);
+
+/// Prints what terms with a target read at the start and at the goal, and what they want: a line each. asked.c.
+cav_status cav_command_print_asked(const cav_problem *problem, cav_error *error);
+
+/// The free joint of a tree with actuators whose place and tilt a posture term of joints leaves open; -1: none. asked.c.
+int cav_command_base(const cav_problem *problem, const cav_term *term);
+
+/// Whether a term is of forces at the last knot of a motion that does not close at rest, where there are none: nothing
+/// measures it. asked.c.
+int cav_command_unmeasured(const cav_problem *problem, const cav_term *term);
 
 /// Whether gravity and contacts alone act on a tree of links that floats, none of it lifted by buoyancy. postures.c.
 int cav_command_floats(const cav_model *model, int root);

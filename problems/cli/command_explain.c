@@ -245,6 +245,8 @@ int cav_command_explain(const cav_command_line *line) {
   } else if (!status) {
     print_brief(&explanation, &verdict, proofs ? &impossible : NULL, pumping, missed, repair);
   }
+  if (!status && !line->json && !(verdict.certified && verdict.achieved))
+    cav_command_tell_diagnoses(stdout, line->operand, result->problem);
   cav_result_free(result);
   free(repair);
   if (status) return cav_command_fail(&error);

@@ -268,17 +268,7 @@ static void tell_cause(const cav_race *race) {
     const cav_race_entry *e = &race->entry[i];
     if (e->strategy.use != CAV_STRATEGY_DIAGNOSIS || e->state != CAV_RACE_DONE || !cav_race_success(&e->report))
       continue;
-    if (e->strategy.open) {
-      fprintf(stderr,
-              "cavort: not with an end at rest, but certified and achieved where the end may still move: <horizon "
-              "close=\"open\"/>\n");
-      continue;
-    }
-    fprintf(stderr,
-            "cavort: not in %.4g s, but in %.4g s, certified and achieved, times of windows in proportion; if it may "
-            "last so "
-            "long: <horizon duration=\"%.4g\" range=\"%.4g %.4g\"/>\n",
-            p->duration, e->report.verdict.duration, p->duration, p->duration, 2 * p->duration);
+    cav_command_tell_would_do(stderr, "cavort: ", p, e->strategy.open ? 0 : e->report.verdict.duration);
   }
 }
 
@@ -316,6 +306,7 @@ static int solve_from(const cav_command_line *line, const cav_problem *problem, 
   int most = b->start ? 1 : line->strategies ? line->strategies : CAV_STRATEGIES;
   cav_status status = cav_race_open(&race, most, &error);
   if (!status && race.tell) cav_command_tell_step(stderr, problem);
+  if (!status && race.tell) cav_command_tell_units(stderr, problem);
   if (!status && race.tell) cav_command_tell_equalities(stderr, problem);
   if (!status && race.tell) cav_command_tell_postures(stderr, problem);
   if (!status && race.tell) cav_command_tell_axes(stderr, problem);

@@ -10,6 +10,7 @@
 #include "file.h"
 #include "objects.h"
 #include "plannable.h"
+#include "problem_file.h"
 #include "quantity.h"
 #include "sense.h"
 #include "stand.h"
@@ -25,7 +26,7 @@ static void print_sizes(const cav_model *m) {
   printf("model %s\n", m->name[0] ? m->name : "without a name");
   printf("  positions %d, velocities %d, controls %d, mass %.4g kg, step %g s, gravity %g %g %g m/s^2\n", m->nq, m->nv,
          m->nu, m->mass, m->timestep, m->gravity[0], m->gravity[1], m->gravity[2]);
-  printf("  %d bodies in %d moving links in %d tree%s, %d geoms, %d sites, %d sensors, %d keyframes, %.1f kB\n\n",
+  printf("  %d bodies in %d moving links in %d tree%s, %d geoms, %d sites, %d sensors, %d keyframes, %.1f kB\n",
          m->nbody - 1, m->nlink - 1, tree, tree == 1 ? "" : "s", m->ngeom, m->nsite, m->nsensor, m->nkey,
          (double)m->bytes / 1024);
 }
@@ -333,7 +334,8 @@ static void print_actuators(const cav_model *m) {
     int before = 0, after = 0;
     for (int k = 0; why && k < m->nu; k++) *(k < i ? &before : &after) += cav_actuator_unplannable(m, k) == why;
     if (!why || before) continue;
-    printf("  not with '%.60s'", m->actuator[i].name);
+    char words[CAV_WORDS];
+    printf("  not with '%.100s'", cav_actuator_words(m, i, words));
     if (after > 1) printf(" and %d more", after - 1);
     printf(": %s\n", why);
   }
@@ -417,10 +419,17 @@ static void print_target(const cav_problem *p, const cav_term *term) {
 static void print_standing(const cav_problem *p, const cav_term *term) {
   cav_tolerance tolerance[4];
   int reported, n = cav_term_tolerances(p, term, 4, tolerance, &reported);
+  if (n && cav_command_unmeasured(p, term)) {
+    printf("; never measured: a motion with close=\"open\" has no forces at its last knot; ask at %g s, or before",
+           p->duration - p->timestep);
+    return;
+  }
   for (int i = 0; i < n && i < 4; i++)
     printf("%s %g%s%s", i ? "," : "; to be met within", tolerance[i].within, *tolerance[i].unit ? " " : "",
            tolerance[i].unit);
   if (n && term->use == CAV_USE_COST && !(term->within > 0)) printf(" (usual)");
+  if (n && term->use == CAV_USE_COST && cav_command_base(p, term) >= 0)
+    printf("; leaves height, place and tilt of the base open");
   if (!n && reported) printf("; reported only, %s", term->within > 0 ? "within=\"any\"" : "no within=");
   if (term->quantity == CAV_QUANTITY_SLIP && term->within > 0) {
     if (isinf(term->within))
@@ -436,11 +445,40 @@ static void print_name(const cav_term *term) {
     printf("'%s': ", term->name);
 }
 
-static void print_terms(const cav_problem *p, int hard) {
+// a cost over the motion, of which nothing is asked
+static int runs(const cav_problem *p, const cav_term *term) {
+  int reported;
+  cav_term_tolerances(p, term, 0, NULL, &reported);
+  const int slides = term->quantity == CAV_QUANTITY_SLIP && term->within > 0;
+  return term->use == CAV_USE_COST && !reported && term->quantity != CAV_QUANTITY_SENSOR &&
+         term->quantity != CAV_QUANTITY_TRACK && !slides;
+}
+
+// costs over the motion by their weights, in one paragraph
+static void print_running(const cav_problem *p) {
+  enum { WIDTH = 110 };
+  int n = 0, used = 0;
+  for (int i = 0; i < p->nterm; i++) {
+    const cav_term *term = &p->term[i];
+    char text[100];
+    if (!runs(p, term)) continue;
+    snprintf(text, sizeof text, "%.60s %.4g", *term->name ? term->name : cav_quantity_rule_of(term->quantity)->name,
+             term->weight);
+    if (!n++)
+      used = printf("  running costs by weight: ");
+    else
+      used += printf(",");
+    if (used + (int)strlen(text) > WIDTH) used = printf("\n    ") - 1;
+    used += printf("%s%s", n > 1 && used > 4 ? " " : "", text);
+  }
+  if (n) printf("\n");
+}
+
+static void print_terms(const cav_problem *p, int hard, int all) {
   int n = 0;
   for (int i = 0; i < p->nterm; i++) {
     const cav_term *term = &p->term[i];
-    if ((term->use != CAV_USE_COST) != hard) continue;
+    if ((term->use != CAV_USE_COST) != hard || (!all && runs(p, term))) continue;
     if (!n++)
       printf("%s; achieved needs those that are to be met, the rest is not asked for\n",
              hard ? "constraints" : "costs");
@@ -524,11 +562,13 @@ void cav_command_tell_step(FILE *out, const cav_problem *p) {
     fprintf(out, "note: a free body falls by %.3g m in one step of %g s: durations and steps are in s\n", fall,
             p->timestep);
   if (p->duration / p->timestep > MANY_KNOTS)
-    fprintf(out, "note: %g s in steps of %g s are %.0f knots, %.3g GB at least: durations and steps are in s\n",
-            p->duration, p->timestep, p->duration / p->timestep + 1, bytes_of(p) / 1e9);
+    fprintf(
+        out,
+        "note: %g s in steps of %g s are %.0f knots, %.3g GB at least: durations and steps are in s; %g ms are %g\n",
+        p->duration, p->timestep, p->duration / p->timestep + 1, bytes_of(p) / 1e9, p->duration, p->duration / 1000);
 }
 
-static cav_status print_problem(const cav_problem *p, cav_error *error) {
+static cav_status print_problem(const cav_problem *p, int all, cav_error *error) {
   static const char *const order[] = {"euler", "midpoint", "momentum"};
   int knots = (int)lround(p->duration / p->timestep) + 1;
   printf("problem %s\n", p->name[0] ? p->name : "without a name");
@@ -537,8 +577,10 @@ static cav_status print_problem(const cav_problem *p, cav_error *error) {
          : p->close_at_rest ? "at rest after the last knot"
                             : "open after the last knot");
   cav_command_tell_step(stdout, p);
+  cav_command_tell_units(stdout, p);
   cav_command_tell_equalities(stdout, p);
   cav_command_tell_postures(stdout, p);
+  cav_command_tell_goal(stdout, p);
   cav_command_tell_axes(stdout, p);
   if (p->duration_most > 0)
     printf("  duration free from %g to %g s, weight %g\n", p->duration_least, p->duration_most, p->duration_weight);
@@ -550,8 +592,9 @@ static cav_status print_problem(const cav_problem *p, cav_error *error) {
                                              : "");
   cav_command_tell_asymmetry(p, stdout);
   cav_status status = cav_command_print_stance(p, "start", p->q_start, error);
-  if (!status) status = cav_command_print_stance(p, "goal", p->q_goal, error);
+  if (!status && cav_problem_has_goal(p)) status = cav_command_print_stance(p, "goal", p->q_goal, error);
   if (status) return status;
+  if (!cav_problem_has_goal(p)) printf("  goal   no <goal>: the goal posture is the start\n");
   if (*cav_problem_lowered(p))
     printf("  note: height=\"floor\" of %s; <root joint=\"...\" height=\"keep\"/> in it leaves a body in the air\n",
            cav_problem_lowered(p));
@@ -566,12 +609,15 @@ static cav_status print_problem(const cav_problem *p, cav_error *error) {
   if (p->nguess_pose > 0) printf(" by %d postures", p->nguess_pose);
   if (p->guess_height > 0) printf(", with an arc of %g m from %g to %g s", p->guess_height, p->guess_from, p->guess_to);
   printf("\n");
-  status = print_equations(p, error);
-  if (status) return status;
+  if (all && (status = print_equations(p, error))) return status;
   printf("  actuators up to %g of their limits, joints and tendons %g rad or m inside theirs\n", p->effort_limit,
          p->limit_margin);
-  print_terms(p, 0);
-  print_terms(p, 1);
+  print_terms(p, 0, all);
+  if (!all) print_running(p);
+  print_terms(p, 1, all);
+  status = cav_command_print_asked(p, error);
+  if (!status && !all) printf("\n");
+  if (status || !all) return status;
   const cav_stage_options *a = &p->schedule.first, *b = &p->schedule.last;
   printf("schedule: %d stages, geometric; contacts that slide by %s law, %s gap and %s slip after the step\n",
          p->schedule.stages, p->schedule.sliding == CAV_SLIDING_CONVEX ? "the convex" : "Coulomb's",
@@ -581,15 +627,21 @@ static cav_status print_problem(const cav_problem *p, cav_error *error) {
   return CAV_OK;
 }
 
-static cav_status print_model(const cav_model *m, const cav_problem *p, cav_error *error) {
+// of a problem in brief its size alone, of a model what it holds, with all what an evaluation runs
+static cav_status print_model(const cav_model *m, const cav_problem *p, int all, cav_error *error) {
   print_sizes(m);
-  print_bodies(m);
-  cav_status status = print_joints(m, p, error);
-  if (!status) status = print_places(m, p, error);
-  if (status) return status;
-  print_roles(m);
-  print_stages(m);
-  print_costs(m);
+  if (!p || all) {
+    printf("\n");
+    print_bodies(m);
+    cav_status status = print_joints(m, p, error);
+    if (!status) status = print_places(m, p, error);
+    if (status) return status;
+    print_roles(m);
+  }
+  if (all) {
+    print_stages(m);
+    print_costs(m);
+  }
   print_actuators(m);
   print_warnings(m);
   return CAV_OK;
@@ -598,7 +650,9 @@ static cav_status print_model(const cav_model *m, const cav_problem *p, cav_erro
 // whether achieved needs nothing, and no constraint says what has to hold
 static int asks_nothing(const cav_problem *p) {
   for (int i = 0; i < p->nterm; i++)
-    if (p->term[i].use != CAV_USE_COST || cav_term_tolerances(p, &p->term[i], 0, NULL, NULL)) return 0;
+    if ((p->term[i].use != CAV_USE_COST || cav_term_tolerances(p, &p->term[i], 0, NULL, NULL)) &&
+        !cav_command_unmeasured(p, &p->term[i]))
+      return 0;
   return !p->cycle.on;
 }
 
@@ -610,17 +664,22 @@ int cav_command_inspect(const cav_command_line *line) {
   int proofs = 0;
   if (scene.problem) {
     if ((proofs = cav_command_impossible(stdout, "", scene.problem, 3, &error)) < 0) status = error.status;
-    if (!status) status = print_problem(scene.problem, &error);
+    if (!status) status = print_problem(scene.problem, line->all, &error);
   }
-  if (!status) status = print_model(scene.model, scene.problem, &error);
+  if (!status) status = print_model(scene.model, scene.problem, line->all, &error);
   if (!status && scene.problem && asks_nothing(scene.problem))
     printf(
         "\nnote: no term has to be met: <goal> is where the guess ends; <posture dofs=\"all\" at=\"end\" "
         "weight=\"900\"/> in <cost> "
         "asks for it\n");
+  if (!status && !line->all)
+    printf(scene.problem
+               ? "\n--all: joints, places of bodies, roles, equations, schedule, and what an evaluation runs\n"
+               : "\n--all: what an evaluation runs and leaves out, its time and memory\n");
   // the verdict once more, where nothing buries it
   if (!status && scene.problem)
-    printf(proofs ? "\nimpossible, as the first lines say: %s\n" : "\nnothing proves it impossible: cavort solve %s\n",
+    printf(proofs ? "\nit cannot be solved, as the first lines say: %s\n"
+                  : "\nnothing proves it impossible: cavort solve %s\n",
            line->stated ? line->stated : line->operand);
   cav_command_free(&scene);
   if (status) return cav_command_fail(&error);

@@ -83,7 +83,10 @@ static const cav_manual_option options[] = {
     {OPTION_QUIET, "--quiet", "-q", NULL, "no progress and no table; errors and the exit status remain"},
     {OPTION_QUICK, "--quick", NULL, NULL, "in seconds instead of minutes: fewer values, states, steps and repeats"},
     {OPTION_FORCE, "--force", NULL, NULL, "solve what is proven impossible all the same"},
-    {OPTION_ALL, "--all", NULL, NULL, "all that is missed, and all that pulls, with what usually helps"},
+    {OPTION_ALL, "--all", NULL, NULL,
+     "explain: all that is missed, and all that pulls, with what usually helps; inspect: joints and places of a "
+     "problem's "
+     "model, equations, what an evaluation runs, takes and leaves out"},
     {OPTION_JSON, "--json", NULL, NULL, "print as JSON what would be a table"},
     {OPTION_JOBS, "--jobs", "-j", "N",
      "several problems: so many at once, each with one thread (default: as many as processors)"},
@@ -118,10 +121,11 @@ static int help(const cav_command_line *line);
 
 static const cav_manual_command commands[] = {
     {"inspect", "MODEL|PROBLEM",
-     "say what a model or a problem holds, what it runs and what it leaves out; of a problem first whether something "
+     "say what a model or a problem holds (--all: what it runs and leaves out, too); of a problem first whether "
+     "something "
      "proves it\n"
      "  impossible, and all that looks wrong with it: the way to check a file before it is solved",
-     cav_command_inspect, OPTION_MODEL | OPTION_FLOATING | OPTION_SET},
+     cav_command_inspect, OPTION_MODEL | OPTION_FLOATING | OPTION_ALL | OPTION_SET},
     {"new", "MODEL",
      "write a problem file to begin with, for a model (-o, default MODEL-first.xml): a wish that suits it, and its "
      "joints,\n"

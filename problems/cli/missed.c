@@ -41,6 +41,7 @@ static void suggest(const cav_problem *p, char *text, size_t size) {
 
 /// How far a motion is from the ends of what actuators and joints can do, where no multiplier speaks of a limit.
 static void tell_room(const cav_problem *p, const cav_trajectory *motion, char *text, size_t size) {
+  char words[CAV_WORDS];
   const cav_model *m = p->model;
   cav_error ignored = {0};
   cav_forces *forces = cav_forces_new(m, motion, &p->contact, p->close_at_rest, &ignored);
@@ -66,8 +67,8 @@ static void tell_room(const cav_problem *p, const cav_trajectory *motion, char *
         snprintf(text + n, size - (size_t)n,
                  " and actuators do nothing: where all stands still nothing leads on, which <swing> in <guess> breaks");
   else if (of >= 0)
-    n += snprintf(text + n, size - (size_t)n, ": actuators give at most %.2g %% of their limits ('%.40s' at %.3g s)",
-                  100 * most, m->actuator[of].name, at * motion->timestep);
+    n += snprintf(text + n, size - (size_t)n, ": actuators give at most %.2g %% of their limits ('%.100s' at %.3g s)",
+                  100 * most, cav_actuator_words(m, of, words), at * motion->timestep);
   if (joint >= 0 && (size_t)n < size)
     snprintf(text + n, size - (size_t)n, ", the nearest end of a range is %.2g %s off ('%.40s')", fmax(near, 0),
              m->joint[joint].type == CAV_JOINT_HINGE ? "rad" : "m", m->joint[joint].name);
@@ -186,98 +187,139 @@ static int goes_beyond(const cav_term_report *got, const cav_term_report *start)
   return !strcmp(got->what, start->what) && (got->got - got->wanted) * (start->got - start->wanted) < 0;
 }
 
+/// What is told of the term that is missed most.
+typedef struct miss {
+  const cav_problem *p;
+  const cav_term *term;
+  const cav_term_report *got, *all; ///< of the term, and of all
+  const cav_explanation *e;
+  const char *name, *unit, *gap; ///< gap: what stands before the unit
+  double way, done;              ///< what the start is off by, and how much of that the motion goes
+  char weight[300], tried[300], ended[100];
+} miss;
+
+/// How the texts begin: "'door' is 1.2 rad from where the start has it".
+static int tell_way(const miss *s, char *text, size_t size) {
+  return snprintf(text, size, "'%.60s' is %.3g%s%s from where the start has it", s->name, s->way, s->gap, s->unit);
+}
+
+/// What the strongest of the constraints that hold a motion back is, after some words; "" without one.
+static const char *holds(const miss *s, const char *words, char text[300]) {
+  *text = 0;
+  if (s->e->nconflict) snprintf(text, 300, "; %s: %.160s", words, s->e->conflict[0].what);
+  return text;
+}
+
+/// Of a body that nothing touches which an actuator moves: how to bring a hand to it.
+static void tell_untouched(const miss *s, const char *body, const char *folder, char *text, size_t size) {
+  const cav_problem *p = s->p;
+  const int brought = seen_from(p, link_of(p, s->term, s->got->what));
+  const cav_term *hand = brought >= 0 ? &p->term[brought] : NULL;
+  char pushed[200];
+  tell_pushed(folder, pushed, sizeof pushed);
+  int n = tell_way(s, text, size);
+  n += snprintf(text + n, size - (size_t)n, ", and nothing that an actuator moves touches '%.40s'", body);
+  if (hand)
+    snprintf(
+        text + n, size - (size_t)n,
+        ". '%.60s' asks for something there, at a weight of %.3g, and is off by %.2g m. Next: its target at the "
+        "face to push on, less what the body that pushes is thick, from when on it can be there; or postures in "
+        "<guess> that have it there%s.",
+        *hand->name ? hand->name : s->all[brought].what, hand->weight, s->all[brought].off,
+        p->schedule.kinematics ? "" : "; or <schedule kinematics=\"true\"/>, which begins from where targets are met");
+  else if (*pushed)
+    snprintf(
+        text + n, size - (size_t)n,
+        ". The strategy push brought a hand to it and missed: %.160s. Next: more time, close=\"open\" in <horizon> "
+        "where it may move at the end, less friction or a lighter body to see whether it is too heavy, or "
+        "postures in <guess> that push it.",
+        pushed);
+  else
+    snprintf(
+        text + n, size - (size_t)n,
+        ": from afar no change of the motion brings it nearer, whatever its weight. Next: bring a hand to it, by "
+        "<sensor type=\"framepos\" body=\"%.40s\" reftype=\"body\" refname=\"%.40s\" target=\"0 0 0\" from=\"%.2g\" "
+        "weight=\"300\" within=\"any\"/>, its target at the side to push from, or by postures in <guess> that "
+        "have it there.",
+        hand_of(p->model), body, p->duration / 3);
+}
+
+/// Of a motion that stays about where it starts: what leads elsewhere.
+static void tell_still(const miss *s, const cav_trajectory *motion, char *text, size_t size) {
+  const cav_term_report *got = s->got;
+  const char *unit = s->unit, *gap = s->gap, *tried = s->tried, *more = *tried ? "; " : ", or ";
+  char hint[160], room[300];
+  suggest(s->p, hint, sizeof hint);
+  int n = tell_way(s, text, size);
+  if (s->e->nconflict) {
+    snprintf(text + n, size - (size_t)n,
+             ", and the motion goes %.2g%s%s of that by %.3g s; what holds it back: %.160s. It ended %s: %s%s%s.",
+             fmax(s->done, 0), gap, unit, got->time, s->e->conflict[0].what, s->ended, hint, more,
+             *tried ? tried : "a higher weight does");
+    return;
+  }
+  tell_room(s->p, motion, room, sizeof room);
+  snprintf(text + n, size - (size_t)n,
+           ", %.3g%s%s a second, and the motion goes %.2g%s%s of that by %.3g s, though %s. The search ended %s, with "
+           "%.3g %% of the cost in this term; nothing proves that it cannot be had, nor that it can. Next: half of the "
+           "way, or more time, to see what can be; %s%s%s.",
+           s->way / fmax(got->time, s->p->timestep), gap, unit, fmax(s->done, 0), gap, unit, got->time, room, s->ended,
+           100 * got->fraction, hint, more, *tried ? tried : "a higher weight does");
+}
+
+/// Of a motion that goes part of the way, too far, or away from where it starts: what it is traded against.
+static void tell_traded(const miss *s, int beyond, char *text, size_t size) {
+  const cav_term_report *got = s->got;
+  char held[300];
+  if (s->way <= got->within) {
+    snprintf(text, size,
+             "the start has '%.60s' to %.3g%s%s, and the motion leaves it by %.3g%s%s at %.3g s%s. It is traded "
+             "against other costs: %s.",
+             s->name, s->way, s->gap, s->unit, got->off, s->gap, s->unit, got->time, holds(s, "what holds it", held),
+             s->weight);
+    return;
+  }
+  const int n = tell_way(s, text, size);
+  if (beyond)
+    snprintf(text + n, size - (size_t)n,
+             ", and the motion goes %.3g%s%s too far by %.3g s%s. It is traded against other costs: %s.", got->off,
+             s->gap, s->unit, got->time, holds(s, "what holds it there", held), s->weight);
+  else
+    snprintf(text + n, size - (size_t)n,
+             ", and the motion goes %.0f %% of that by %.3g s%s. The rest is traded against other costs: %s.",
+             100 * s->done / s->way, got->time, holds(s, "what holds it back", held), s->weight);
+}
+
 static void tell(const cav_problem *p, const cav_trajectory *motion, const cav_term_report *got,
                  const cav_term_report *held, int i, const cav_explanation *e, double saving, const char *folder,
                  char *text, size_t size) {
-  const cav_term *term = &p->term[i];
-  int named = *term->name && strcmp(term->name, cav_quantity_rule_of(term->quantity)->name);
-  const char *name = named ? term->name : got[i].what, *unit = got[i].unit, *gap = *unit ? " " : "";
-  double way = held[i].off, done = way - got[i].off;
+  miss s = {.p = p, .term = &p->term[i], .got = &got[i], .all = got, .e = e, .unit = got[i].unit};
+  const int named = *s.term->name && strcmp(s.term->name, cav_quantity_rule_of(s.term->quantity)->name);
   const double more = 2 * got[i].off / got[i].within;
-  char hint[160], room[300], tried[300], weight[300], pushed[200], ended[100] = "at the optimum next to its guess";
+  s.name = named ? s.term->name : got[i].what;
+  s.gap = *s.unit ? " " : "";
+  s.way = held[i].off, s.done = s.way - got[i].off;
+  snprintf(s.ended, sizeof s.ended, "at the optimum next to its guess");
   if (saving > far_off)
-    snprintf(ended, sizeof ended, "short of an optimum, where a step may still save %.2g %% of the cost", 100 * saving);
-  tell_heavier(folder, term->name, done < still * way && way > got[i].within ? 1 : more, tried, sizeof tried);
-  snprintf(weight, sizeof weight, "a weight %.2g times as large brings it nearer", more);
-  if (*tried) snprintf(weight, sizeof weight, "%s", tried);
-  const char *body = done < still * way && way > got[i].within ? untouched(p, motion, term, got[i].what) : NULL;
-  tell_pushed(folder, pushed, sizeof pushed);
-  const int brought = body ? seen_from(p, link_of(p, term, got[i].what)) : -1;
-  if (body && brought >= 0) {
-    const cav_term *hand = &p->term[brought];
-    snprintf(
-        text, size,
-        "'%.60s' is %.3g%s%s from where the start has it, and nothing that an actuator moves touches '%.40s'. '%.60s' "
-        "asks for something there, at a weight of %.3g, and is off by %.2g m. Next: its target at the face to push on, "
-        "less what the body that pushes is thick, from when on it can be there; or postures in <guess> that have it "
-        "there%s.",
-        name, way, gap, unit, body, *hand->name ? hand->name : got[brought].what, hand->weight, got[brought].off,
-        p->schedule.kinematics ? "" : "; or <schedule kinematics=\"true\"/>, which begins from where targets are met");
-  } else if (body && *pushed) {
-    snprintf(
-        text, size,
-        "'%.60s' is %.3g%s%s from where the start has it, and nothing that an actuator moves touches '%.40s'. The "
-        "strategy push brought a hand to it and missed: %.160s. Next: more time, close=\"open\" in <horizon> where "
-        "it may move at the end, less friction or a lighter body to see whether it is too heavy, or postures in "
-        "<guess> that push it.",
-        name, way, gap, unit, body, pushed);
-  } else if (body) {
-    snprintf(
-        text, size,
-        "'%.60s' is %.3g%s%s from where the start has it, and nothing that an actuator moves touches '%.40s': from "
-        "afar "
-        "no change of the motion brings it nearer, whatever its weight. Next: bring a hand to it, by <sensor "
-        "type=\"framepos\" body=\"%.40s\" reftype=\"body\" refname=\"%.40s\" target=\"0 0 0\" from=\"%.2g\" "
-        "weight=\"300\" within=\"any\"/>, its target at the side to push from, or by postures in <guess> that have it "
-        "there.",
-        name, way, gap, unit, body, hand_of(p->model), body, p->duration / 3);
-  } else if (cav_problem_is_given(p)) {
-    snprintf(
-        text, size,
-        "'%.60s' is off by %.3g%s%s at %.3g s, and no actuator moves this model: the motion follows from its start, "
-        "and no weight changes it. Next: another start (where, or how fast), duration, mass or friction.",
-        name, got[i].off, gap, unit, got[i].time);
-  } else if (way <= got[i].within) {
+    snprintf(s.ended, sizeof s.ended, "short of an optimum, where a step may still save %.2g %% of the cost",
+             100 * saving);
+  const int stays = s.done < still * s.way && s.way > got[i].within;
+  tell_heavier(folder, s.term->name, stays ? 1 : more, s.tried, sizeof s.tried);
+  snprintf(s.weight, sizeof s.weight, "a weight %.2g times as large brings it nearer", more);
+  if (*s.tried) snprintf(s.weight, sizeof s.weight, "%s", s.tried);
+  const char *body = stays ? untouched(p, motion, s.term, got[i].what) : NULL;
+  const int beyond = goes_beyond(&got[i], &held[i]);
+  if (body)
+    tell_untouched(&s, body, folder, text, size);
+  else if (cav_problem_is_given(p))
     snprintf(text, size,
-             "the start has '%.60s' to %.3g%s%s, and the motion leaves it by %.3g%s%s at %.3g s%s%.160s. It is traded "
-             "against other "
-             "costs: %s.",
-             name, way, gap, unit, got[i].off, gap, unit, got[i].time, e->nconflict ? "; what holds it: " : "",
-             e->nconflict ? e->conflict[0].what : "", weight);
-  } else if (goes_beyond(&got[i], &held[i])) {
-    snprintf(text, size,
-             "'%.60s' is %.3g%s%s from where the start has it, and the motion goes %.3g%s%s too far by %.3g s%s%.160s. "
-             "It is traded against other costs: %s.",
-             name, way, gap, unit, got[i].off, gap, unit, got[i].time, e->nconflict ? "; what holds it there: " : "",
-             e->nconflict ? e->conflict[0].what : "", weight);
-  } else if (done < still * way) {
-    suggest(p, hint, sizeof hint);
-    if (!e->nconflict) tell_room(p, motion, room, sizeof room);
-    if (!e->nconflict)
-      snprintf(
-          text, size,
-          "'%.60s' is %.3g%s%s from where the start has it, %.3g%s%s a second, and the motion goes %.2g%s%s of that by "
-          "%.3g s, though %s. The search ended %s, with %.3g %% of the cost in this "
-          "term; "
-          "nothing proves that it cannot be had, nor that it can. Next: half of the way, or more time, to see what can "
-          "be; %s%s%s.",
-          name, way, gap, unit, way / fmax(got[i].time, p->timestep), gap, unit, fmax(done, 0), gap, unit, got[i].time,
-          room, ended, 100 * got[i].fraction, hint, *tried ? "; " : ", or ", *tried ? tried : "a higher weight does");
-    else
-      snprintf(text, size,
-               "'%.60s' is %.3g%s%s from where the start has it, and the motion goes %.2g%s%s of that by %.3g s; what "
-               "holds it back: "
-               "%.160s. It ended %s: %s%s%s.",
-               name, way, gap, unit, fmax(done, 0), gap, unit, got[i].time, e->conflict[0].what, ended, hint,
-               *tried ? "; " : ", or ", *tried ? tried : "a higher weight does");
-  } else {
-    snprintf(text, size,
-             "'%.60s' is %.3g%s%s from where the start has it, and the motion goes %.0f %% of that by %.3g s%s%.160s. "
-             "The rest "
-             "is traded against other costs: %s.",
-             name, way, gap, unit, 100 * done / way, got[i].time, e->nconflict ? "; what holds it back: " : "",
-             e->nconflict ? e->conflict[0].what : "", weight);
-  }
+             "'%.60s' is off by %.3g%s%s at %.3g s, and no actuator moves this model: the motion follows from its "
+             "start, and no weight changes it. Next: another start (where, or how fast), duration, mass or friction.",
+             s.name, got[i].off, s.gap, s.unit, got[i].time);
+  else if (stays && !beyond)
+    tell_still(&s, motion, text, size);
+  else
+    tell_traded(&s, beyond, text, size);
 }
 
 int cav_command_missed(const cav_result *result, const cav_explanation *e, double saving, const char *folder,

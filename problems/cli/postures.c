@@ -11,6 +11,9 @@
 #include "cavort/problem.h"
 #include "cavort/solve.h"
 #include "command.h"
+#include "math3.h"
+#include "problem_file.h"
+#include "rotation.h"
 
 // clear of everything by more than this it falls rather than settles
 static const double clear = 0.02; // m
@@ -49,10 +52,10 @@ static int tell_depth(FILE *out, const cav_problem *p, int start) {
   const cav_contact *deepest = state ? cav_command_deepest(state) : NULL;
   const int deep = deepest && -deepest->dist > CAV_TOLERANCE_PENETRATION;
   if (deep) {
-    char moves[CAV_GEOM_LABEL], stands[CAV_GEOM_LABEL];
+    char moves[CAV_WORDS], stands[CAV_WORDS];
     const int still = cav_command_pair(m, deepest->pair, moves, stands);
     const cav_term *asked = start ? NULL : asks_for_goal(p);
-    fprintf(out, "note: the %s has geom '%.48s' %.3g mm inside '%.48s', and a certificate allows %g: ",
+    fprintf(out, "note: the %s has geom '%.100s' %.3g mm inside '%.100s', and a certificate allows %g: ",
             start ? "start" : "goal", moves, -1e3 * deepest->dist, stands, 1e3 * CAV_TOLERANCE_PENETRATION);
     if (asked)
       fprintf(out, "'%.60s' asks for it at the end and may not be met. ", asked->name ? asked->name : "posture");
@@ -69,50 +72,77 @@ static int tell_depth(FILE *out, const cav_problem *p, int start) {
   return deep;
 }
 
-static double tolerance_of(const cav_problem *p, const cav_term *t) {
-  return cav_term_tolerance(p, t, CAV_WITHIN_LENGTH); // places alone
-}
+/// How far a posture is from what a term on a place, an angle or an orientation asks for at the end, beyond what it allows.
+typedef struct disagreement {
+  double wanted, has, within;
+  char unit[16], what[24]; ///< what: "z ", "turned by "
+} disagreement;
 
-/// By how much the goal's posture misses what a term on a place asks for at the end, and what it has; 0: by no more than
-/// the term allows.
-static double goal_misses(const cav_problem *p, cav_state *state, const cav_term *t, int *component, double *has) {
-  const cav_sensor *s = &t->sensor;
-  const int place = s->type == CAV_SENSOR_FRAMEPOS || s->type == CAV_SENSOR_SUBTREECOM;
-  const double to = t->to < 0 ? p->duration : t->to, within = tolerance_of(p, t);
-  double at[CAV_SENSOR_DIM_MAX], most = 0;
-  if (t->quantity != CAV_QUANTITY_SENSOR || !place || !t->target || t->nwaypoint || !isfinite(within)) return 0;
+/// Whether a term has to be met at the end, by one value that is read of a posture.
+static int is_read_at_end(const cav_problem *p, const cav_term *t) {
+  const double to = t->to < 0 ? p->duration : t->to;
+  if (t->quantity != CAV_QUANTITY_SENSOR || !t->target || t->nwaypoint || t->use == CAV_USE_RANGE) return 0;
+  if (cav_sensor_rule_of(t->sensor.type)->stage != CAV_READS_POSITION || t->sensor.cutoff > 0) return 0;
   if (t->use == CAV_USE_COST && !(t->weight > 0)) return 0;
-  if (to < p->duration - p->timestep / 2 || t->from > p->duration) return 0;
-  cav_sensor_read(p->model, state, s, at);
-  for (int k = 0; k < s->dim; k++) {
-    if (t->component >= 0 && t->component != k) continue;
-    const double off = fabs(at[k] - t->target[k]);
-    if (off > within && off > most) most = off, *component = k, *has = at[k];
-  }
-  return most;
+  return to >= p->duration - p->timestep / 2 && t->from <= p->duration;
 }
 
-/// A goal asked for at the end, and a term that wants a place of it elsewhere then.
-static int tell_disagreement(FILE *out, const cav_problem *p) {
-  const cav_term *asked = asks_for_goal(p);
-  if (!asked || asked->dofs != CAV_DOFS_ALL) return 0;
+/// Whether a posture that the state is at misses such a term, and by what.
+static int misses(const cav_problem *p, cav_state *state, const cav_term *t, disagreement *d) {
+  const cav_sensor *s = &t->sensor;
+  cav_tolerance tolerance;
+  double at[CAV_SENSOR_DIM_MAX], turn[3], most = 0;
+  if (!is_read_at_end(p, t) || !cav_term_tolerances(p, t, 1, &tolerance, NULL)) return 0;
+  d->within = tolerance.within;
+  memcpy(d->unit, tolerance.unit, sizeof d->unit);
+  cav_sensor_read(p->model, state, s, at);
+  if (s->dim == 4) {
+    cav_rotation_between(t->target, at, turn);
+    d->wanted = 0, d->has = t->component < 0 ? norm3(turn) : fabs(turn[t->component]);
+    snprintf(d->what, sizeof d->what, "turned by ");
+    return d->has > d->within;
+  }
+  for (int k = 0; k < s->dim; k++) {
+    const double off = fabs(at[k] - t->target[k]);
+    if ((t->component >= 0 && t->component != k) || !(off > d->within) || !(off > most)) continue;
+    most = off, d->wanted = t->target[k], d->has = at[k];
+    snprintf(d->what, sizeof d->what, "%s", s->dim == 1 ? "" : (const char *[]){"x ", "y ", "z "}[k]);
+  }
+  return most > 0;
+}
+
+/// A goal, and a term that wants another reading of it at the end: one that is asked for, by which the two cannot both be met,
+/// or one that only leads the guess.
+static int tell_disagreement(FILE *out, const cav_problem *p, const cav_term *asked) {
   cav_state *state = posture_of(p, p->q_goal, 0);
   int n = 0;
   for (int i = 0; state && i < p->nterm; i++) {
     const cav_term *t = &p->term[i];
-    int k = 0;
-    double has = 0;
-    if (!(goal_misses(p, state, t, &k, &has) > 0)) continue;
+    disagreement d;
+    // of coordinates it is a proof
+    if ((asked && t->sensor.type == CAV_SENSOR_JOINTPOS) || !misses(p, state, t, &d)) continue;
+    const char *gap = *d.unit ? " " : "";
     fprintf(
         out,
-        "note: the goal disagrees with '%.60s', which wants %c %.3g (within %.3g) at the end: the goal's posture, "
-        "which '%.60s' asks for, has %.3g there. Change one of them, or end the one before the other begins (to=)\n",
-        *t->name ? t->name : "sensor", "xyz"[k], t -> target[k], tolerance_of(p, t),
-        asked -> name && * asked -> name ? asked -> name : "posture", has);
+        "note: the goal disagrees with '%.60s', which wants %s%.3g%s%s (within %.3g) at the end: the goal's posture",
+        *t->name ? t->name : "sensor", d.what, d.wanted, gap, d.unit, d.within);
+    if (asked)
+      fprintf(out,
+              ", which '%.60s' asks for, has %.3g there. Change one of them, or end the one before the other begins "
+              "(to=)\n",
+              asked->name && *asked->name ? asked->name : "posture", d.has);
+    else
+      fprintf(out, " has %.3g. It only leads the guess, since no term asks for it: a <goal> that has it leads there\n",
+              d.has);
     n++;
   }
   cav_state_free(state);
   return n;
+}
+
+int cav_command_tell_goal(FILE *out, const cav_problem *p) {
+  if (p->cycle.on || asks_for_goal(p) || !cav_problem_has_goal(p)) return 0;
+  return tell_disagreement(out, p, NULL);
 }
 
 int cav_command_floats(const cav_model *m, int root) {
@@ -281,7 +311,8 @@ int cav_command_tell_postures(FILE *out, const cav_problem *p) {
   const int same = !memcmp(p->q_goal, p->q_start, sizeof *p->q_goal * (size_t)p->model->nq);
   if (p->free_start || !same) n += tell_depth(out, p, 0);
   if (p->free_start && !same) n += tell_depth(out, p, 1);
-  n += tell_disagreement(out, p);
+  const cav_term *asked = asks_for_goal(p);
+  if (asked && asked->dofs == CAV_DOFS_ALL) n += tell_disagreement(out, p, asked);
   // what falls is told, and so is what is proven impossible
   if (n > 0 || p->duration < 3 * p->timestep || is_impossible(p)) return n;
   if (!p->free_start && rests(p)) n += tell_weakness(out, p, "start", p->q_start, 0);

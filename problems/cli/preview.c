@@ -25,7 +25,7 @@ static cav_status note_depth(const cav_model *m, cav_state *state, const double 
 
 // "2.1 mm: 'a' in 'b'"
 static void tell(const cav_model *m, const penetration *p, double timestep, int when, char *out, size_t size) {
-  char a[CAV_GEOM_LABEL], b[CAV_GEOM_LABEL], time[40] = "";
+  char a[CAV_WORDS], b[CAV_WORDS], time[40] = "";
   if (p->depth < 1e-6) {
     snprintf(out, size, "inside nothing");
     return;

@@ -7,36 +7,17 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "math3.h"
+
 // an end that moves by less than this fraction of the limb's length at a unit rate is turned, not moved (a limb within 14 degrees
 // of the axis); components beyond this fraction of the largest are told; points as far out as this fraction of the farthest are
 // the far end, which stands for a body whose centre is nearer than this fraction of that
 static const double still = 0.25, told = 0.5, far = 0.9, near = 0.5;
 
-static double dot(const double *a, const double *b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-
-static void cross(const double *a, const double *b, double *out) {
-  for (int k = 0; k < 3; k++) out[k] = a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3];
-}
-
 static double distance(const double *a, const double *b) {
-  const double d[3] = {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
-  return sqrt(dot(d, d));
-}
-
-// out = R v, or of the transpose
-static void rotate(const double *r, int back, const double *v, double *out) {
-  for (int i = 0; i < 3; i++) {
-    out[i] = 0;
-    for (int k = 0; k < 3; k++) out[i] += (back ? r[3 * k + i] : r[3 * i + k]) * v[k];
-  }
-}
-
-static void matrix_of(const double *w, double *r) {
-  const double a = w[0], x = w[1], y = w[2], z = w[3], n = a * a + x * x + y * y + z * z;
-  const double rotation[9] = {n - 2 * (y * y + z * z), 2 * (x * y - a * z),     2 * (x * z + a * y),
-                              2 * (x * y + a * z),     n - 2 * (x * x + z * z), 2 * (y * z - a * x),
-                              2 * (x * z - a * y),     2 * (y * z + a * x),     n - 2 * (x * x + y * y)};
-  for (int k = 0; k < 9; k++) r[k] = rotation[k] / n;
+  double d[3];
+  sub3(d, a, b);
+  return norm3(d);
 }
 
 // whether roles say which way a tree looks
@@ -57,12 +38,13 @@ static void axes_of(const cav_model *m, const cav_state *state, const cav_roles 
   const cav_joint *first = m->link[root].njoint ? &m->joint[m->link[root].joint] : NULL;
   memcpy(axes, own, sizeof own);
   if (!first || first->type != CAV_JOINT_FREE) return;
-  double file[9];
-  matrix_of(m->q0 + first->q + 3, file);
+  double quat[4], file[9];
+  memcpy(quat, m->q0 + first->q + 3, sizeof quat);
+  quat_normalise(quat);
+  quat_matrix(file, quat);
   for (int k = 0; k < 3; k++) {
-    double fixed[3];
-    rotate(file, 1, own[k], fixed);
-    rotate(state->link[root].rotation, 0, fixed, axes[k]);
+    rotate_back(axes[k], file, own[k]);
+    rotate(axes[k], state->link[root].rotation, axes[k]);
   }
 }
 
@@ -95,7 +77,7 @@ static double centre_of(const cav_model *m, const cav_state *state, int link, co
     if (above != link) continue;
     mass += m->link[i].mass;
     most = fmax(most, distance(state->com + 3 * i, from));
-    for (int k = 0; k < 3; k++) sum[k] += m->link[i].mass * state->com[3 * i + k];
+    axpy3(sum, sum, m->link[i].mass, state->com + 3 * i);
   }
   for (int k = 0; k < 3; k++) out[k] = mass > 0 ? sum[k] / mass : state->link[link].pos[k];
   return most;
@@ -139,12 +121,11 @@ static double far_end(const cav_model *m, const cav_state *state, int body, cons
       for (int corner = 0; corner < 8; corner++) {
         double local[3], point[3];
         for (int k = 0; k < 3; k++) local[k] = corner >> k & 1 ? half[k] : -half[k];
-        rotate(at.rotation, 0, local, point);
-        for (int k = 0; k < 3; k++) point[k] += at.pos[k];
+        transform(point, at.pos, at.rotation, local);
         const double away = distance(point, from);
         if (!pass) most = fmax(most, away);
         if (!pass || away < far * most) continue;
-        for (int k = 0; k < 3; k++) sum[k] += point[k];
+        add3(sum, sum, point);
         n++;
       }
     }
@@ -160,8 +141,7 @@ static int end_of(const cav_model *m, const cav_state *state, int joint, double 
   int link = it->link, child;
   while ((child = child_of(m, link)) >= 0) link = child;
   const int body = child == -1 ? last_body(m, link) : m->link[link].body;
-  rotate(state->link[it->link].rotation, 0, it->pos, anchor);
-  for (int k = 0; k < 3; k++) anchor[k] += state->link[it->link].pos[k];
+  transform(anchor, state->link[it->link].pos, state->link[it->link].rotation, it->pos);
   if (child == -2) {
     *length = centre_of(m, state, link, anchor, end);
     return body;
@@ -207,12 +187,12 @@ void cav_sense_of(const cav_model *m, const cav_state *state, const cav_roles *r
   const int body = end_of(m, state, joint, end, &length);
   const double *spatial = state->axis + 6 * it->dof, *reference = state->reference + 3 * it->link;
   axes_of(m, state, roles, m->link[it->link].root, axes);
-  for (int k = 0; k < 3; k++) arm[k] = end[k] - reference[k];
-  cross(spatial, arm, moved);
-  for (int k = 0; k < 3; k++) moved[k] += spatial[3 + k];
-  for (int k = 0; k < 3; k++) velocity[k] = dot(axes[k], moved), rate[k] = dot(axes[k], spatial);
+  sub3(arm, end, reference);
+  copy3(moved, spatial + 3);
+  cross_add3(moved, spatial, arm);
+  for (int k = 0; k < 3; k++) velocity[k] = dot3(axes[k], moved), rate[k] = dot3(axes[k], spatial);
   const char *name = *m->body[body].name ? m->body[body].name : "its end";
-  if (it->type == CAV_JOINT_HINGE && !(sqrt(dot(velocity, velocity)) > still * length)) {
+  if (it->type == CAV_JOINT_HINGE && !(norm3(velocity) > still * length)) {
     name_turn(rate, name, text, CAV_SENSE);
   } else {
     const int used = snprintf(text, CAV_SENSE, "%.60s ", name);

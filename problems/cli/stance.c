@@ -10,12 +10,12 @@
 static const double touching = 0.005, deep = 5e-5; // m
 enum { NAMED = 8 };
 
-int cav_command_pair(const cav_model *m, int pair, char moves[CAV_GEOM_LABEL], char stands[CAV_GEOM_LABEL]) {
+int cav_command_pair(const cav_model *m, int pair, char moves[CAV_WORDS], char stands[CAV_WORDS]) {
   const cav_pair *of = &m->pair[pair];
   const int still = m->geom[of->geom2].link == 0 ? of->geom2 : of->geom1;
-  char label[CAV_GEOM_LABEL];
-  snprintf(moves, CAV_GEOM_LABEL, "%s", cav_geom_label(m, still == of->geom1 ? of->geom2 : of->geom1, label));
-  snprintf(stands, CAV_GEOM_LABEL, "%s", cav_geom_label(m, still, label));
+  char label[CAV_WORDS];
+  snprintf(moves, CAV_WORDS, "%s", cav_geom_words(m, still == of->geom1 ? of->geom2 : of->geom1, label));
+  snprintf(stands, CAV_WORDS, "%s", cav_geom_words(m, still, label));
   return still;
 }
 
@@ -76,9 +76,9 @@ cav_status cav_command_print_stance(const cav_problem *p, const char *name, cons
   print_touch(p->model, state);
   const cav_contact *deepest = cav_command_deepest(state);
   if (deepest && -deepest->dist > deep) {
-    char moves[CAV_GEOM_LABEL], stands[CAV_GEOM_LABEL];
+    char moves[CAV_WORDS], stands[CAV_WORDS];
     cav_command_pair(p->model, deepest->pair, moves, stands);
-    printf(", deepest penetration %.1f mm: '%.60s' in '%.60s'", -1e3 * deepest->dist, moves, stands);
+    printf(", deepest penetration %.1f mm: '%.100s' in '%.100s'", -1e3 * deepest->dist, moves, stands);
   }
   printf("\n");
   cav_state_free(state);

@@ -16,6 +16,30 @@ void cav_command_tell_tried(FILE *out, const char *folder) {
             seconds);
 }
 
+void cav_command_tell_would_do(FILE *out, const char *before, const cav_problem *p, double seconds) {
+  if (seconds > 0)
+    fprintf(out,
+            "%snot in %.4g s, but in %.4g s, certified and achieved, times of windows in proportion; if it may last so "
+            "long: <horizon duration=\"%.4g\" range=\"%.4g %.4g\"/>\n",
+            before, p->duration, seconds, p->duration, p->duration, 2 * p->duration);
+  else
+    fprintf(out,
+            "%snot with an end at rest, but certified and achieved where the end may still move: <horizon "
+            "close=\"open\"/>\n",
+            before);
+}
+
+void cav_command_tell_diagnoses(FILE *out, const char *folder, const cav_problem *p) {
+  cav_tried t = cav_tried_open(folder);
+  while (cav_tried_next(&t)) {
+    double seconds = 0;
+    if (t.kept || strcmp(t.outcome, "certified")) continue;
+    if (sscanf(t.reason, "%lf s would do", &seconds) == 1 || !strcmp(t.reason, "an open end would do"))
+      cav_command_tell_would_do(out, "", p, seconds);
+  }
+  cav_tried_close(&t);
+}
+
 /// Whether a folder has a file.
 static int has(const char *folder, const char *name) {
   char *path = cav_result_path(folder, name);

@@ -688,6 +688,13 @@ cav_status cav_race_write(const cav_race *race, int kept, const char *path, cav_
     write_quoted(file.stream, e->strategy.changed);
     char missed[sizeof v->missed + 16] = "";
     if (known && *v->missed) snprintf(missed, sizeof missed, "misses %s", v->missed);
+    // of a diagnosis that succeeded what would do
+    if (known && e->strategy.use == CAV_STRATEGY_DIAGNOSIS && cav_race_success(&e->report)) {
+      if (e->strategy.open)
+        snprintf(missed, sizeof missed, "an open end would do");
+      else
+        snprintf(missed, sizeof missed, "%.4g s would do", v->duration);
+    }
     write_quoted(file.stream, !known ? e->report.text : *v->reason ? v->reason : missed);
     fputc('\n', file.stream);
   }

@@ -119,12 +119,13 @@ static void print_targets(FILE *out, const cav_problem *problem, const cav_term_
     for (int i = 0; i < problem->nterm && shown < TARGETS_SHOWN; i++) {
       const cav_term_report *r = &report[i];
       if (!r->has_target || r->met != met) continue;
-      char within[24] = "", wanted[40];
+      char within[24] = "", wanted[40], whole[40] = "";
+      if (r->off_alone < r->off) snprintf(whole, sizeof whole, " (%.3g as a vector)", r->off);
       print_wanted(&problem->term[i], r, wanted, sizeof wanted);
       if (isfinite(r->within)) snprintf(within, sizeof within, "%.3g", r->within);
       const char *name = problem->term[i].name && *problem->term[i].name ? problem->term[i].name : "unnamed";
-      fprintf(out, "  %-30.30s %-18.18s %8.4g %10s %10.4g %10.3g %10s %s %s\n", name, r->what, r->time, wanted, r->got,
-              r->off, within, r->unit, isfinite(r->within) ? mark[r->met] : "");
+      fprintf(out, "  %-30.30s %-18.18s %8.4g %10s %10.4g %10.3g %10s %s %s%s\n", name, r->what, r->time, wanted,
+              r->got, r->off_alone, within, r->unit, isfinite(r->within) ? mark[r->met] : "", whole);
       shown++;
     }
   }
@@ -179,7 +180,9 @@ void cav_certificate_print(FILE *out, const cav_problem *problem, const cav_verd
   if (*problem->model->name) fprintf(out, " on %s", problem->model->name);
   if (!isnan(v->residual_fraction_max))
     fprintf(out, ", with residual forces on its root of up to %.3g %% of the weight", 100 * v->residual_fraction_max);
-  fputc('\n', out);
+  // both words in the line that is looked for
+  fprintf(out, v->achieved ? "; achieved%s\n" : "; NOT achieved%s\n",
+          v->achieved && !v->ntarget ? " (nothing had to be met)" : "");
   int missed = 0;
   for (int i = 0; i < n; i++) missed += line[i].passed == 0;
   if (!v->certified) fprintf(out, "  %s\n", v->reason);

@@ -1,0 +1,335 @@
+/// What the terms of a problem ask for beside what its start and goal have: a line a term, with units. Readings of places and
+/// orientations at both postures, of velocities at the start; forces are not known of a posture. And of single terms what
+/// their words hide: that a posture of joints leaves a free base open, that a force at an open end is never measured, that
+/// numbers are likely to be of another unit.
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "cavort/dynamics.h"
+#include "cavort/solve.h"
+#include "command.h"
+#include "math3.h"
+#include "objects.h"
+#include "quantity.h"
+#include "rotation.h"
+
+enum { CELL = 80, NAME = 112 };
+
+/// The postures that are compared, and the columns of the table.
+typedef struct comparison {
+  const cav_problem *p;
+  cav_state *start, *goal;
+  double *work; ///< [nq + 2 nv]
+} comparison;
+
+int cav_command_base(const cav_problem *p, const cav_term *term) {
+  const cav_model *m = p->model;
+  if (term->quantity != CAV_QUANTITY_CONFIGURATION || term->dofs != CAV_DOFS_JOINTS) return -1;
+  for (int j = 0; j < m->njoint; j++)
+    if (m->joint[j].type == CAV_JOINT_FREE && cav_command_is_loose(m, m->joint[j].link)) return j;
+  return -1;
+}
+
+int cav_command_unmeasured(const cav_problem *p, const cav_term *term) {
+  const double end = term->to < 0 ? p->duration : term->to;
+  const int last = (int)lround(p->duration / p->timestep);
+  if (term->quantity != CAV_QUANTITY_ACCELERATION && term->quantity != CAV_QUANTITY_EFFORT &&
+      term->quantity != CAV_QUANTITY_POWER && cav_term_stage(term) != CAV_READS_ACCELERATION)
+    return 0;
+  // only a motion that closes at rest has forces at its last knot
+  if (p->close_at_rest && !p->cycle.on) return 0;
+  return end - term->from < 1e-9 ? lround(term->from / p->timestep) >= last
+                                 : ceil(term->from / p->timestep - 1e-6) >= last;
+}
+
+/// Target of a term at a time, dim numbers: linear between waypoints, zeros where it has none.
+static void target_at(const cav_term *term, double time, int dim, double *out) {
+  int low = 0, high = 0;
+  double part = 0;
+  for (int k = 0; k < dim; k++) out[k] = 0;
+  if (!term->target) return;
+  while (high + 1 < term->nwaypoint && term->waypoint_time[high] < time) high++;
+  low = high > 0 && term->waypoint_time[high] > time ? high - 1 : high;
+  if (low < high) part = (time - term->waypoint_time[low]) / (term->waypoint_time[high] - term->waypoint_time[low]);
+  for (int k = 0; k < dim; k++) out[k] = (1 - part) * term->target[low * dim + k] + part * term->target[high * dim + k];
+}
+
+/// Unit of a value of a term: that of its tolerance, if it had one.
+static void unit_of(const cav_problem *p, const cav_term *term, char unit[16]) {
+  cav_term asked = *term;
+  cav_tolerance tolerance[4];
+  asked.within = 1;
+  const int n = cav_term_tolerances(p, &asked, 4, tolerance, NULL);
+  snprintf(unit, 16, "%s", n == 1 ? tolerance[0].unit : "");
+}
+
+/// A number without the sign of a zero, and not in digits that are rounding.
+static double plain(double x) { return fabs(x) < 5e-7 ? 0 : x; }
+
+/// The reading of a sensor at a posture, as it is compared; "-": it has none.
+static void write_reading(const comparison *c, const cav_term *term, cav_state *state, double time, char *out) {
+  const cav_sensor *s = &term->sensor;
+  const cav_sensor_stage stage = cav_sensor_rule_of(s->type)->stage;
+  double x[CAV_SENSOR_DIM_MAX], target[CAV_SENSOR_DIM_MAX] = {1}, phi[3];
+  snprintf(out, CELL, "-");
+  if (stage == CAV_READS_ACCELERATION || (stage == CAV_READS_VELOCITY && (state != c->start || c->p->free_start)))
+    return;
+  cav_sensor_read(c->p->model, state, s, x);
+  if (s->dim == 4) {
+    if (term->target) target_at(term, time, 4, target);
+    quat_normalise(target);
+    cav_rotation_between(target, x, phi);
+    snprintf(out, CELL, "%.4g off", plain(term->component < 0 ? norm3(phi) : phi[term->component]));
+  } else if (s->dim == 1 || term->component >= 0) {
+    snprintf(out, CELL, "%.4g", plain(x[s->dim == 1 ? 0 : term->component]));
+  } else {
+    snprintf(out, CELL, "%.4g %.4g %.4g", plain(x[0]), plain(x[1]), plain(x[2]));
+  }
+}
+
+/// What is wanted of a sensor at a time.
+static void write_wanted(const cav_term *term, double time, char *out) {
+  const cav_sensor *s = &term->sensor;
+  double target[CAV_SENSOR_DIM_MAX];
+  const int one = s->dim == 1 || term->component >= 0, k = s->dim == 1 ? 0 : term->component;
+  if (term->use == CAV_USE_RANGE && isinf(term->upper))
+    snprintf(out, CELL, ">= %.4g", term->lower);
+  else if (term->use == CAV_USE_RANGE && isinf(term->lower))
+    snprintf(out, CELL, "<= %.4g", term->upper);
+  else if (term->use == CAV_USE_RANGE)
+    snprintf(out, CELL, "%.4g .. %.4g", term->lower, term->upper);
+  else if (s->dim == 4)
+    snprintf(out, CELL, "0 off");
+  else {
+    target_at(term, time, s->dim, target);
+    if (one)
+      snprintf(out, CELL, "%.4g", plain(target[k]));
+    else
+      snprintf(out, CELL, "%.4g %.4g %.4g", plain(target[0]), plain(target[1]), plain(target[2]));
+  }
+}
+
+/// The end of a term's window, at which its target is compared.
+static double time_of(const cav_problem *p, const cav_term *term) {
+  return term->to < 0 || term->to > p->duration ? p->duration : term->to;
+}
+
+/// Of the dofs that a posture term selects, how far q is from it at each, over the usual tolerance: d [nv]; the farthest.
+static int farthest(const cav_problem *p, const cav_term *term, const double *wanted, const double *q, double *d) {
+  const cav_model *m = p->model;
+  int most = -1;
+  cav_difference(m, wanted, q, 1, d);
+  for (int i = 0; i < m->nv; i++) {
+    const cav_joint *joint = &m->joint[m->dof[i].joint];
+    const int free = joint->type == CAV_JOINT_FREE,
+              line = joint->type == CAV_JOINT_SLIDE || (free && i < joint->dof + 3);
+    const int selected = term->dofs == CAV_DOFS_ALL || (term->dofs == CAV_DOFS_JOINTS && !free) ||
+                         (term->dofs == CAV_DOFS_ROOT_LINEAR && free && line) ||
+                         (term->dofs == CAV_DOFS_ROOT_ANGULAR && free && !line) ||
+                         (term->dofs == CAV_DOFS_ONE && m->dof[i].joint == term->joint);
+    d[i] = selected ? fabs(d[i]) / (line ? CAV_WITHIN_LENGTH : CAV_WITHIN_ANGLE) : -1;
+    if (selected && (most < 0 || d[i] > d[most])) most = i;
+  }
+  return most;
+}
+
+/// A dof of a configuration: of what turns in three ways how far it is turned from what is wanted.
+static void write_dof(const cav_model *m, const double *wanted, const double *q, int d, double *work, char *out) {
+  const cav_joint *joint = &m->joint[m->dof[d].joint];
+  const int place = d - joint->dof;
+  if (joint->type == CAV_JOINT_BALL || (joint->type == CAV_JOINT_FREE && place >= 3)) {
+    cav_difference(m, wanted, q, 1, work);
+    snprintf(out, CELL, "%.4g off", plain(work[d]));
+  } else {
+    snprintf(out, CELL, "%.4g", plain(q[joint->q + place]));
+  }
+}
+
+/// The row of a posture term: of the dof that is farthest off, at the start or at the goal. 0: the term selects none.
+static int write_posture(const comparison *c, const cav_term *term, char name[NAME], char cell[3][CELL],
+                         char unit[16]) {
+  static const char *const axis[] = {" x", " y", " z", " turn x", " turn y", " turn z"};
+  const cav_problem *p = c->p;
+  const cav_model *m = p->model;
+  double *wanted = c->work, *d = wanted + m->nq, *other = d + m->nv;
+  memcpy(wanted, p->q_goal, (size_t)m->nq * sizeof *wanted);
+  if (term->target) target_at(term, time_of(p, term), m->nq, wanted);
+  if (term->target) cav_configuration_normalise(m, wanted);
+  const int a = farthest(p, term, wanted, p->q_start, d), b = farthest(p, term, wanted, p->q_goal, other);
+  if (a < 0) return 0;
+  const int at = other[b] > d[a] ? b : a;
+  const cav_joint *joint = &m->joint[m->dof[at].joint];
+  const int place = at - joint->dof, free = joint->type == CAV_JOINT_FREE, ball = joint->type == CAV_JOINT_BALL;
+  const size_t used = strlen(name);
+  if (term->dofs != CAV_DOFS_ONE || free || ball)
+    snprintf(name + used, NAME - used, ", farthest %.40s%s", *joint->name ? joint->name : "joint",
+             free   ? axis[place]
+             : ball ? axis[3 + place]
+                    : "");
+  write_dof(m, wanted, p->q_start, at, d, cell[0]);
+  write_dof(m, wanted, p->q_goal, at, d, cell[1]);
+  write_dof(m, wanted, wanted, at, d, cell[2]);
+  snprintf(unit, 16, "%s", joint->type == CAV_JOINT_SLIDE || (free && place < 3) ? "m" : "rad");
+  if (term->use == CAV_USE_RANGE) snprintf(cell[2], CELL, "its bounds");
+  return 1;
+}
+
+/// Name of a term, or what it is of.
+static void write_name(const cav_problem *p, const cav_term *term, char name[NAME]) {
+  const int sensor = term->quantity == CAV_QUANTITY_SENSOR;
+  if (*term->name && strcmp(term->name, cav_quantity_rule_of(term->quantity)->name)) {
+    snprintf(name, NAME, "'%.48s'", term->name);
+  } else if (sensor) {
+    snprintf(name, NAME, "%s of %.40s", cav_sensor_rule_of(term->sensor.type)->name,
+             cav_object_name(p->model, term->sensor.object_type, term->sensor.object));
+  } else {
+    snprintf(name, NAME, "posture");
+    if (term->dofs == CAV_DOFS_ONE) snprintf(name, NAME, "posture of %.40s", p->model->joint[term->joint].name);
+  }
+  const size_t used = strlen(name);
+  if (sensor && term->component >= 0 && term->sensor.dim > 1)
+    snprintf(name + used, NAME - used, " %c", "xyz"[term->component]);
+}
+
+/// The row of a term; 0: it has none.
+static int write_row(const comparison *c, const cav_term *term, char name[NAME], char cell[3][CELL]) {
+  const cav_problem *p = c->p;
+  int reported, sensor = term->quantity == CAV_QUANTITY_SENSOR;
+  char unit[16];
+  if (!sensor && term->quantity != CAV_QUANTITY_CONFIGURATION) return 0;
+  cav_term_tolerances(p, term, 0, NULL, &reported);
+  if (!reported && !(sensor && term->target)) return 0;
+  write_name(p, term, name);
+  if (sensor) {
+    const double time = time_of(p, term);
+    unit_of(p, term, unit);
+    write_reading(c, term, c->start, time, cell[0]);
+    write_reading(c, term, c->goal, time, cell[1]);
+    write_wanted(term, time, cell[2]);
+  } else if (!write_posture(c, term, name, cell, unit)) {
+    return 0;
+  }
+  const size_t used = strlen(name);
+  if (*unit) snprintf(name + used, NAME - used, ", %s", unit);
+  return 1;
+}
+
+/// Prints the rows, or notes how wide their cells are.
+static void go_through(const comparison *c, int width[4], int print) {
+  char name[NAME], cell[3][CELL];
+  for (int i = 0; i < c->p->nterm; i++) {
+    if (!write_row(c, &c->p->term[i], name, cell)) continue;
+    const char *text[4] = {name, cell[0], cell[1], cell[2]};
+    for (int k = 0; k < 4 && !print; k++) width[k] = (int)fmax(width[k], (double)strlen(text[k]));
+    if (print)
+      printf("  %-*s  %*s  %*s  %*s\n", width[0], name, width[1], cell[0], width[2], cell[1], width[3], cell[2]);
+  }
+}
+
+cav_status cav_command_print_asked(const cav_problem *p, cav_error *error) {
+  const cav_model *m = p->model;
+  comparison c = {p, cav_state_new(m), cav_state_new(m), calloc((size_t)(m->nq + 3 * m->nv) + 1, sizeof(double))};
+  cav_status status = c.start && c.goal && c.work ? CAV_OK : CAV_NO_MEMORY;
+  int width[4] = {0, (int)strlen("start"), (int)strlen("goal"), (int)strlen("wanted")}, before = width[0];
+  if (!status) status = cav_position(m, c.goal, p->q_goal);
+  // velocities are those after a step
+  if (!status) status = cav_inverse(m, c.start, p->q_start, p->v_start, p->v_start, c.work);
+  if (status) {
+    *error = (cav_error){.status = status};
+    snprintf(error->text, sizeof error->text, "start and goal cannot be compared with what is asked: %s",
+             cav_status_name(status));
+  } else {
+    go_through(&c, width, 0);
+    if (width[0] > before) {
+      width[0] = (int)fmax(width[0], 20);
+      printf("%-*s  %*s  %*s  %*s\n", width[0] + 2, "what start and goal have", width[1], "start", width[2], "goal",
+             width[3], "wanted");
+      go_through(&c, width, 1);
+    }
+  }
+  cav_state_free(c.start);
+  cav_state_free(c.goal);
+  free(c.work);
+  return status;
+}
+
+/// Rotations of a hinge, and metres, from which on another unit is likely.
+static const double many_turns = 4 * M_PI, far_away = 50;
+
+/// "'knee'", or what the term is of, for a note.
+static const char *called(const cav_problem *p, const cav_term *term, char name[NAME]) {
+  cav_term whole = *term;
+  if (*term->name) whole.component = -1;
+  write_name(p, &whole, name);
+  return name;
+}
+
+/// Of a hinge that is wanted at an angle of many turns.
+static int tell_degrees(FILE *out, const cav_problem *p, const cav_term *term) {
+  const cav_model *m = p->model;
+  const int sensor = term->quantity == CAV_QUANTITY_SENSOR && term->sensor.type == CAV_SENSOR_JOINTPOS;
+  const int posture = term->quantity == CAV_QUANTITY_CONFIGURATION && term->dofs == CAV_DOFS_ONE;
+  char name[NAME];
+  if ((!sensor && !posture) || !term->target || term->nwaypoint) return 0;
+  const cav_joint *joint = &m->joint[sensor ? term->sensor.object : term->joint];
+  const double wanted = joint->type == CAV_JOINT_HINGE ? term->target[sensor ? 0 : joint->q] : 0;
+  if (!(fabs(wanted) > many_turns)) return 0;
+  fprintf(out, "note: %s wants joint '%.60s' at %g rad, %.3g turns: targets are in radians; %g degrees are %.4g\n",
+          called(p, term, name), joint->name, wanted, fabs(wanted) / (2 * M_PI), wanted, wanted * M_PI / 180);
+  return 1;
+}
+
+/// Of a place that is farther than motions go, and would not be if it was in millimetres.
+static int tell_millimetres(FILE *out, const cav_problem *p, const cav_term *term) {
+  const cav_sensor *s = &term->sensor;
+  char name[NAME];
+  double most = 0;
+  if (term->quantity != CAV_QUANTITY_SENSOR || !term->target || term->nwaypoint) return 0;
+  if (s->type != CAV_SENSOR_FRAMEPOS && s->type != CAV_SENSOR_SUBTREECOM) return 0;
+  for (int k = 0; k < s->dim; k++)
+    if ((term->component < 0 || term->component == k) && fabs(term->target[k]) > fabs(most)) most = term->target[k];
+  if (!(fabs(most) > far_away)) return 0;
+  fprintf(out, "note: %s wants a place at %g m: lengths are in m; %g mm are %g\n", called(p, term, name), most, most,
+          most / 1000);
+  return 1;
+}
+
+/// Of a touch that is asked for without a number: of none.
+static int tell_touch(FILE *out, const cav_problem *p, const cav_term *term) {
+  char name[NAME];
+  if (term->quantity != CAV_QUANTITY_SENSOR || term->sensor.type != CAV_SENSOR_TOUCH || term->target) return 0;
+  if (term->use == CAV_USE_RANGE || term->within > 0) return 0;
+  fprintf(out,
+          "note: %s has no target, which is 0 N: it is kept from touching. target=\"50\", in N, asks for a touch; "
+          "within=\"5\" or a constraint upper=\"0\" has it untouched\n",
+          called(p, term, name));
+  return 1;
+}
+
+/// Of a posture that puts a free body farther than motions go.
+static int tell_far_root(FILE *out, const cav_problem *p, const double *q, const char *which) {
+  for (int j = 0; j < p->model->njoint; j++) {
+    const cav_joint *joint = &p->model->joint[j];
+    if (joint->type != CAV_JOINT_FREE) continue;
+    for (int k = 0; k < 3; k++) {
+      if (!(fabs(q[joint->q + k]) > far_away)) continue;
+      fprintf(out, "note: the %s has '%.60s' at %c %g m: lengths are in m; %g mm are %g\n", which,
+              p->model->body[joint->body].name, "xyz"[k], q[joint->q + k], q[joint->q + k], q[joint->q + k] / 1000);
+      return 1;
+    }
+  }
+  return 0;
+}
+
+int cav_command_tell_units(FILE *out, const cav_problem *p) {
+  int n = tell_far_root(out, p, p->q_start, "start");
+  if (memcmp(p->q_start, p->q_goal, (size_t)p->model->nq * sizeof *p->q_goal))
+    n += tell_far_root(out, p, p->q_goal, "goal");
+  for (int i = 0; i < p->nterm; i++) {
+    const cav_term *term = &p->term[i];
+    n += tell_degrees(out, p, term) + tell_millimetres(out, p, term) + tell_touch(out, p, term);
+  }
+  return n;
+}
