@@ -64,6 +64,24 @@ static void test_asked(void) {
     }
 }
 
+// one that hangs still is certified, and its end at rest is one of two targets: a swing-up whose forces are off by little is kept
+// before it, where it costs a tenth or less; not one whose forces are far off
+static void test_undone(void) {
+  cav_race_report still = whole(), swings = whole();
+  still.verdict.certified = 1, still.verdict.ntarget = 2, still.verdict.nmissed = 1, still.verdict.missed_most = 31;
+  swings.verdict.ntarget = 2, swings.verdict.nmissed = 1, swings.verdict.unactuated_force_max = 3e-4;
+  swings.verdict.constraint_violation_max = 1.4e-3;
+  still.cost = 4939, swings.cost = 22.2;
+  CHECK(cav_rank_better(&swings, &still, 0) && !cav_rank_better(&still, &swings, 0));
+  swings.cost = 1000;
+  CHECK(cav_rank_better(&still, &swings, 0) && !cav_rank_better(&swings, &still, 0));
+  swings.cost = 22.2, swings.verdict.unactuated_force_max = 0.07;
+  CHECK(cav_rank_better(&still, &swings, 0) && !cav_rank_better(&swings, &still, 0));
+  // what misses its target by little is what was asked
+  swings.verdict.unactuated_force_max = 3e-4, still.verdict.missed_most = 1.5;
+  CHECK(cav_rank_better(&still, &swings, 0) && !cav_rank_better(&swings, &still, 0));
+}
+
 // what is changed of a problem has to be worth it: another class, or a hundredth of the cost; what achieves what was asked is
 static void test_worth(void) {
   cav_race_report stated = whole(), changed = whole();
@@ -201,6 +219,7 @@ static void test_nearer(void) {
 int main(void) {
   test_better();
   test_asked();
+  test_undone();
   test_worth();
   test_near();
   test_off();

@@ -384,7 +384,8 @@ typedef struct cav_problem {
   cav_residual residual;          ///< forces on roots that are penalised
   int nparameter;                 ///< numbers of the model that are not known
   const cav_parameter *parameter; ///< [nparameter] found by cav_estimate_solve; all else takes the model as it is
-  double effort_limit;            ///< fraction of the actuator limits planned with, 0 .. 1
+  double effort_limit; ///< fraction of the actuator limits planned with, > 0; above 1 motion and certificate are of actuators
+                       ///< that are so much stronger (files: at most 1)
   double limit_margin;            ///< rad or m kept from joint and tendon limits in planning
   cav_schedule schedule;          ///< of the continuation
   int nipopt;                     ///< options for Ipopt, where it is the solver

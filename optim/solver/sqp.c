@@ -76,8 +76,10 @@ static const double unmarked = 0.3;
 /// off by before a run that nearly brings them in.
 static const double held_loss = 1e-2, nearly = 1e-4, brought_in = 0.1;
 
-/// Iterations after which rows that are farther off than nearly, and have never been half as far as at first, do not come in.
-enum { HOPELESS = 60 };
+/// Iterations after which rows that are farther off than nearly, and have never been half as far as at first, do not come in; and
+/// those that are astray, at first or after they came nearer by half.
+static const double astray = 1e-2;
+enum { HOPELESS = 60, ASTRAY = 40 };
 
 /// Squares of the step, rad or m, that make a programme convex, of the cost: of all knots, and of single ones.
 /// A wave of these takes what is within this fraction of the largest.
@@ -630,8 +632,9 @@ static cav_status go_back(cav_solve_run *run, descent *d) {
 static cav_status settle(cav_solve_run *run, descent *d, int *left, int *settled) {
   int calm = 0, taken = 1;
   tail end = {0};
-  const double off = rows_off(run->tr);
-  int away = off > nearly ? HOPELESS : 0; // iterations left to bring rows in by half; 0: they came, or were in
+  double off = rows_off(run->tr);
+  // iterations left to bring rows in by half; 0: they came, or were in
+  int away = off > astray ? ASTRAY : off > nearly ? HOPELESS : 0;
   cav_status status = CAV_OK;
   for (; status == CAV_OK && *left > 0 && calm < PATIENCE && !is_end(d, &end); --*left) {
     status = model(run, d, 0);
@@ -641,8 +644,9 @@ static cav_status settle(cav_solve_run *run, descent *d, int *left, int *settled
     if (cav_run_report(run, cav_quadratic_length(d->qp), largest_radius(run->tr, d->radius))) status = CAV_INTERRUPTED;
     if (status == CAV_OK) status = hold(run, d);
     if (status == CAV_OK) status = look(run, d, &end);
-    if (away && rows_off(run->tr) < 0.5 * off) away = 0;
-    if (away && !--away) break;
+    const int nearer = away && rows_off(run->tr) < 0.5 * off;
+    if (nearer) off = rows_off(run->tr), away = off > astray ? ASTRAY : 0;
+    if (away && !nearer && !--away) break;
   }
   int ended = is_end(d, &end);
   *settled = ended ? ended : !taken || calm >= PATIENCE;

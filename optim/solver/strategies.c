@@ -37,7 +37,7 @@ static const double wide = 1.6, leisure = 0.6;
 
 /// How much softer and how much slower than stated, how much longer a diagnosis may last, how many
 /// repairs there are at the end, and of what is nearly there by the stated guess and by another one.
-enum { SOFTER = 2, CHEAPER = 10, SLOWER = 2, LONGER = 2, REPAIRS = 4, MEND_STATED = 4, MEND = 2, MEND_LAST = 4 };
+enum { SOFTER = 2, CHEAPER = 10, SLOWER = 2, LONGER = 2, STRONGER = 2, REPAIRS = 4, MEND_STATED = 4, MEND = 2, MEND_LAST = 4 };
 
 /// What the duration of a diagnosis costs, 1/s², so that it is not far from the shortest.
 static const double haste = 100;
@@ -541,10 +541,12 @@ static void add_last(const cav_problem *problem, cav_strategy *strategy, int *n,
 /// What tells a cause where none succeeded. fixed: a longer duration tells nothing.
 static void add_diagnoses(const cav_problem *problem, cav_strategy *strategy, int *n, const cav_strategy *stated,
                           int fixed) {
-  cav_strategy open = *stated, longer = *stated;
-  open.use = longer.use = CAV_STRATEGY_DIAGNOSIS, open.open = 1;
+  cav_strategy open = *stated, stronger = *stated, longer = *stated;
+  open.use = stronger.use = longer.use = CAV_STRATEGY_DIAGNOSIS, open.open = 1;
+  stronger.effort_limit = STRONGER * problem->effort_limit;
   if (!problem->cycle.on && problem->close_at_rest)
     add(strategy, n, &open, "open", "with an end that need not be at rest");
+  if (problem->model->nu > 0 && !fixed) add(strategy, n, &stronger, "stronger", "with actuators twice as strong");
   int timed = problem->window > 0;
   for (int i = 0; i < problem->nterm; i++) timed |= problem->term[i].quantity == CAV_QUANTITY_TRACK;
   if (!problem->cycle.on && problem->duration_most == 0 && !fixed && !timed)
@@ -589,7 +591,7 @@ void cav_strategy_apply(const cav_problem *problem, const cav_strategy *strategy
   if (strategy->term) taken->term = strategy->term, taken->nterm = strategy->nterm;
   if (strategy->open) {
     taken->close_at_rest = 0;
-  } else if (strategy->use == CAV_STRATEGY_DIAGNOSIS) {
+  } else if (strategy->use == CAV_STRATEGY_DIAGNOSIS && strategy->effort_limit <= 0) {
     taken->duration_least = problem->duration;
     taken->duration_most = LONGER * problem->duration;
     taken->duration_weight = haste;

@@ -161,8 +161,16 @@ int cav_command_missed(const cav_result *result, const cav_explanation *explanat
 /// Tells how many strategies a folder's solve tried, and in how many seconds, where they are more than one. tried.c.
 void cav_command_tell_tried(FILE *out, const char *folder);
 
-/// Says that a duration, or at 0 s an end that may move, would do what a problem asks for, each line after a text. tried.c.
-void cav_command_tell_would_do(FILE *out, const char *before, const cav_problem *problem, double seconds);
+/// What a diagnosis changes in a problem.
+typedef enum cav_would_do {
+  CAV_WOULD_DO_DURATION, ///< value, s
+  CAV_WOULD_DO_EFFORT,   ///< value, a multiple of the actuators' limits
+  CAV_WOULD_DO_OPEN_END  ///< none
+} cav_would_do;
+
+/// Says that it would do what a problem asks for, after a text. tried.c.
+void cav_command_tell_would_do(FILE *out, const char *before, const cav_problem *problem, cav_would_do what,
+                               double value);
 
 /// The same of what the solve of a folder found for a problem that it did not solve. tried.c.
 void cav_command_tell_diagnoses(FILE *out, const char *folder, const cav_problem *problem);

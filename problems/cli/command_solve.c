@@ -266,9 +266,13 @@ static void tell_cause(const cav_race *race) {
   if (!cav_command_pumping(p, text)) fprintf(stderr, "cavort: %s\n", text);
   for (int i = 0; i < race->n; i++) {
     const cav_race_entry *e = &race->entry[i];
-    if (e->strategy.use != CAV_STRATEGY_DIAGNOSIS || e->state != CAV_RACE_DONE || !cav_race_success(&e->report))
-      continue;
-    cav_command_tell_would_do(stderr, "cavort: ", p, e->strategy.open ? 0 : e->report.verdict.duration);
+    if (!cav_race_would_do(e)) continue;
+    const int stronger = e->strategy.effort_limit > 0;
+    const cav_would_do what = e->strategy.open ? CAV_WOULD_DO_OPEN_END
+                              : stronger       ? CAV_WOULD_DO_EFFORT
+                                               : CAV_WOULD_DO_DURATION;
+    cav_command_tell_would_do(stderr, "cavort: ", p, what,
+                              stronger ? e->strategy.effort_limit : e->report.verdict.duration);
   }
 }
 

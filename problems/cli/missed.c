@@ -83,6 +83,23 @@ static double times_of(const char *changed, const char *name) {
   return at ? strtod(at + strlen(one), NULL) : all ? strtod(all + sizeof goals - 1, NULL) : 1;
 }
 
+static const double plenty =
+    5; // times its weight from which on a trial in vain tells that weight is not what is missing
+static const double counts = 0.02; // part of the cost from which on another target is told to be in the way
+
+/// Another target that costs most, in words that go on from a weight's; "" where none counts.
+static void tell_opponent(const cav_problem *p, const cav_term_report *report, int missed, char *text, size_t size) {
+  int most = -1;
+  for (int i = 0; i < p->nterm; i++)
+    if (i != missed && report[i].has_target && report[i].fraction > (most < 0 ? counts : report[most].fraction))
+      most = i;
+  *text = 0;
+  if (most < 0) return;
+  const char *name = p->term[most].name;
+  snprintf(text, size, "; beside it '%.60s' is asked for and has %.2g %% of the cost, which may pull the other way",
+           *name ? name : report[most].what, 100 * report[most].fraction);
+}
+
 /// What became of the heaviest weight of a term that was tried, where that is by so many times more than that of the motion
 /// that was kept, or is its own: in words, "" where no such was.
 static void tell_heavier(const char *folder, const char *name, double more, char *text, size_t size) {
@@ -100,7 +117,7 @@ static void tell_heavier(const char *folder, const char *name, double more, char
     snprintf(how, sizeof how, "%.*s", end ? (int)(end - t.reason) : (int)strlen(t.reason), t.reason);
   }
   cav_tried_close(&t);
-  if (*how && most > kept && most >= 0.99 * more * kept)
+  if (*how && most > kept && most >= 0.99 * fmin(more, plenty) * kept)
     snprintf(text, size, "%g times the stated weight was tried (strategies.csv) and did not do: %s", most, how);
 }
 
@@ -195,7 +212,7 @@ typedef struct miss {
   const cav_explanation *e;
   const char *name, *unit, *gap; ///< gap: what stands before the unit
   double way, done;              ///< what the start is off by, and how much of that the motion goes
-  char weight[300], tried[300], ended[100];
+  char weight[480], tried[300], ended[100];
 } miss;
 
 /// How the texts begin: "'door' is 1.2 rad from where the start has it".
@@ -307,6 +324,8 @@ static void tell(const cav_problem *p, const cav_trajectory *motion, const cav_t
   tell_heavier(folder, s.term->name, stays ? 1 : more, s.tried, sizeof s.tried);
   snprintf(s.weight, sizeof s.weight, "a weight %.2g times as large brings it nearer", more);
   if (*s.tried) snprintf(s.weight, sizeof s.weight, "%s", s.tried);
+  const size_t said = strlen(s.weight);
+  tell_opponent(p, got, i, s.weight + said, sizeof s.weight - said);
   const char *body = stays ? untouched(p, motion, s.term, got[i].what) : NULL;
   const int beyond = goes_beyond(&got[i], &held[i]);
   if (body)

@@ -16,26 +16,42 @@ void cav_command_tell_tried(FILE *out, const char *folder) {
             seconds);
 }
 
-void cav_command_tell_would_do(FILE *out, const char *before, const cav_problem *p, double seconds) {
-  if (seconds > 0)
-    fprintf(out,
-            "%snot in %.4g s, but in %.4g s, certified and achieved, times of windows in proportion; if it may last so "
-            "long: <horizon duration=\"%.4g\" range=\"%.4g %.4g\"/>\n",
-            before, p->duration, seconds, p->duration, p->duration, 2 * p->duration);
-  else
-    fprintf(out,
-            "%snot with an end at rest, but certified and achieved where the end may still move: <horizon "
-            "close=\"open\"/>\n",
-            before);
+void cav_command_tell_would_do(FILE *out, const char *before, const cav_problem *p, cav_would_do what, double value) {
+  switch (what) {
+    case CAV_WOULD_DO_DURATION:
+      fprintf(
+          out,
+          "%snot in %.4g s, but in %.4g s, certified and achieved, times of windows in proportion; if it may last so "
+          "long: <horizon duration=\"%.4g\" range=\"%.4g %.4g\"/>\n",
+          before, p->duration, value, p->duration, p->duration, 2 * p->duration);
+      break;
+    case CAV_WOULD_DO_EFFORT:
+      fprintf(
+          out,
+          "%snot with actuators up to %.3g of their limits, but a motion is found where they give up to %.3g of them: "
+          "the model is too weak for this, or nearly so; %sless that is asked for, more time, or stronger actuators\n",
+          before, p->effort_limit, value, p->effort_limit < 1 ? "<limits effort=\"1\"/>, " : "");
+      break;
+    case CAV_WOULD_DO_OPEN_END:
+      fprintf(out,
+              "%snot with an end at rest, but certified and achieved where the end may still move: <horizon "
+              "close=\"open\"/>\n",
+              before);
+      break;
+  }
 }
 
 void cav_command_tell_diagnoses(FILE *out, const char *folder, const cav_problem *p) {
   cav_tried t = cav_tried_open(folder);
   while (cav_tried_next(&t)) {
-    double seconds = 0;
-    if (t.kept || strcmp(t.outcome, "certified")) continue;
-    if (sscanf(t.reason, "%lf s would do", &seconds) == 1 || !strcmp(t.reason, "an open end would do"))
-      cav_command_tell_would_do(out, "", p, seconds);
+    double value = 0;
+    int end = 0;
+    if (t.kept) continue;
+    if (!strcmp(t.reason, "an open end would do")) cav_command_tell_would_do(out, "", p, CAV_WOULD_DO_OPEN_END, 0);
+    if (sscanf(t.reason, "%lf s would do%n", &value, &end) == 1 && end)
+      cav_command_tell_would_do(out, "", p, CAV_WOULD_DO_DURATION, value);
+    if (sscanf(t.reason, "%lf of the efforts would do%n", &value, &end) == 1 && end)
+      cav_command_tell_would_do(out, "", p, CAV_WOULD_DO_EFFORT, value);
   }
   cav_tried_close(&t);
 }

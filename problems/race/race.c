@@ -24,9 +24,6 @@
 // how much more than the cheapest one a motion may cost that is repaired
 static const double dearer = 2;
 
-// force without an actuator, fraction of the weight, and violation of limits and constraints up to which it nearly keeps them
-static const double nearly = 1e-3;
-
 // how often one motion is mended from where it is
 enum { REPAIRS_OF_ONE = 2 };
 
@@ -420,6 +417,14 @@ static void end(cav_race_entry *e) {
   e->answer = e->order = -1;
 }
 
+int cav_race_would_do(const cav_race_entry *entry) {
+  const cav_verdict *v = &entry->report.verdict;
+  if (entry->strategy.use != CAV_STRATEGY_DIAGNOSIS || entry->state != CAV_RACE_DONE || !entry->report.solution)
+    return 0;
+  // what is all but certified is within that strength
+  return cav_race_success(&entry->report) || (entry->strategy.effort_limit > 0 && v->achieved && cav_rank_rough(v));
+}
+
 int cav_race_success(const cav_race_report *report) { return report->verdict.certified && report->verdict.achieved; }
 
 // what comes after a strategy that succeeds cannot be kept any more
@@ -476,7 +481,7 @@ static int find_broken(const cav_race *race, int i, const char *passed) {
       const cav_race_entry *e = &race->entry[k];
       if (e->state != CAV_RACE_DONE || !e->report.solution || e->strategy.use == CAV_STRATEGY_DIAGNOSIS) continue;
       const cav_verdict *v = &e->report.verdict;
-      if (fmax(v->unactuated_force_max, fmax(v->limit_violation_max, v->constraint_violation_max)) > nearly) continue;
+      if (!cav_rank_keeps(v)) continue;
       least = pass == 0 ? fmin(least, e->report.cost) : least;
       if (pass == 0 || e->report.cost > dearer * least || passed[k]) continue;
       if (best < 0 || cav_rank_nearer(&e->report, &race->entry[best].report)) best = k;
@@ -688,14 +693,16 @@ cav_status cav_race_write(const cav_race *race, int kept, const char *path, cav_
     write_quoted(file.stream, e->strategy.changed);
     char missed[sizeof v->missed + 16] = "";
     if (known && *v->missed) snprintf(missed, sizeof missed, "misses %s", v->missed);
-    // of a diagnosis that succeeded what would do
-    if (known && e->strategy.use == CAV_STRATEGY_DIAGNOSIS && cav_race_success(&e->report)) {
+    const int would_do = cav_race_would_do(e);
+    if (would_do) {
       if (e->strategy.open)
         snprintf(missed, sizeof missed, "an open end would do");
+      else if (e->strategy.effort_limit > 0)
+        snprintf(missed, sizeof missed, "%.3g of the efforts would do", e->strategy.effort_limit);
       else
         snprintf(missed, sizeof missed, "%.4g s would do", v->duration);
     }
-    write_quoted(file.stream, !known ? e->report.text : *v->reason ? v->reason : missed);
+    write_quoted(file.stream, !known ? e->report.text : *v->reason && !would_do ? v->reason : missed);
     fputc('\n', file.stream);
   }
   return cav_file_end(&file, error);

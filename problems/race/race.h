@@ -62,6 +62,9 @@ typedef struct cav_race {
   cav_race_entry entry[CAV_STRATEGIES];
 } cav_race;
 
+/// Whether a diagnosis found what a problem asks for: of stronger actuators also what is all but certified.
+int cav_race_would_do(const cav_race_entry *entry);
+
 /// Whether a strategy ended with what is wanted: certified, and every target with a tolerance met.
 int cav_race_success(const cav_race_report *report);
 

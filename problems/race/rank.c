@@ -16,13 +16,32 @@ static const double helped = 0.95;
 // as it is stated, where it is one of a changed problem
 static const double cheaper = 1e-4, worth = 1e-2;
 
+// force without an actuator, fraction of the weight, and violation of limits and constraints up to which it nearly keeps them
+static const double nearly = 5e-3;
+
+// part of the cost from which on what nearly keeps these is nearer to what was asked than one that is certified and does something
+// else: what is missed is in the cost
+static const double undone = 0.1;
+
+static int misses_little(const cav_verdict *v) { return v->missed_most > 0 && v->missed_most < CAV_MISSED_LITTLE; }
+
+int cav_rank_keeps(const cav_verdict *v) {
+  return fmax(v->unactuated_force_max, fmax(v->limit_violation_max, v->constraint_violation_max)) <= nearly;
+}
+
 // how much of what is wanted a motion is: certified and as asked; certified and most of what was asked; as asked, forces,
 // limits and constraints hold, and only the rest of a certificate is missed; certified and something else; none of these
 static int class_of(const cav_race_report *report) {
   const cav_verdict *v = &report->verdict;
   if (cav_race_success(report)) return 4;
-  if (v->certified) return 2 * v->nmissed <= v->ntarget ? 3 : 1;
+  if (v->certified) return 2 * v->nmissed < v->ntarget || misses_little(v) ? 3 : 1;
   return v->achieved && cav_verdict_feasible(v) ? 2 : 0;
+}
+
+// whether one that is certified stands still, or the like, where another one nearly does what was asked
+static int leaves_undone(const cav_race_report *done, const cav_race_report *other) {
+  return class_of(done) == 1 && !other->verdict.certified && cav_rank_keeps(&other->verdict) &&
+         other->cost < undone * done->cost;
 }
 
 int cav_rank_better(const cav_race_report *a, const cav_race_report *b, int cheapest) {
@@ -41,6 +60,7 @@ int cav_rank_better(const cav_race_report *a, const cav_race_report *b, int chea
   int stopped = a->status == CAV_INTERRUPTED, other = b->status == CAV_INTERRUPTED;
   if (stopped || other) return !stopped;
   if (cav_race_success(a) && cav_race_success(b)) return cheapest && a->cost < (1 - cheaper) * b->cost;
+  if (leaves_undone(a, b) || leaves_undone(b, a)) return leaves_undone(b, a);
   if (class_of(a) != class_of(b)) return class_of(a) > class_of(b);
   // what was asked is in the cost
   if (v->certified) return a->cost < (1 - cheaper) * b->cost;
@@ -69,8 +89,7 @@ int cav_rank_rough(const cav_verdict *v) {
 int cav_rank_near(const cav_race_report *report, double effort) {
   const cav_verdict *v = &report->verdict;
   if (!report->solution || report->status == CAV_INTERRUPTED) return 0;
-  if (v->certified)
-    return !v->achieved && (2 * v->nmissed < v->ntarget || (v->missed_most > 0 && v->missed_most < CAV_MISSED_LITTLE));
+  if (v->certified) return !v->achieved && (2 * v->nmissed < v->ntarget || misses_little(v));
   // a motion that does something else is not what is looked for
   if (2 * v->nmissed > v->ntarget) return 0;
   if (cav_rank_rough(v)) return 1;

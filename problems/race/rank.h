@@ -5,13 +5,17 @@
 #include "race.h"
 
 /// Whether a is the better motion to keep: the one that is certified and achieves what was asked (of two the first, or the
-/// cheaper); of two that are certified alone the cheaper one; otherwise the one that keeps more of the certificate's
+/// cheaper); of two that are certified alone the cheaper one; one that is certified and does something else comes after one that
+/// nearly keeps forces, limits and constraints at a tenth of its cost; otherwise the one that keeps more of the certificate's
 /// conditions, in their order, or misses the same one by less.
 int cav_rank_better(const cav_race_report *a, const cav_race_report *b, int cheapest);
 
 /// Whether a is worth what was changed of the problem for it: of two that are certified and miss as much of what was asked it has
 /// to be cheaper by a hundredth.
 int cav_rank_worth(const cav_race_report *a, const cav_race_report *b);
+
+/// Whether a motion nearly keeps forces, limits and constraints.
+int cav_rank_keeps(const cav_verdict *verdict);
 
 /// Whether a motion that is possible misses little else of a certificate: it is what is looked for, but for how it was
 /// planned.
