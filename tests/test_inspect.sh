@@ -240,5 +240,17 @@ inspected 0 p.xml
 not_said "tabletop', inside"
 check "it lies on the table" grep -qE "^  box .* 1.000 +0.000 +0.800$" out
 
+# --- a guess through a solid; the ground is what every guess is in a little ---
+cat >block.xml <<TEXT
+<problem name="block" model="$root/problems/models/humanoid.xml">
+<scene><geom name="block" type="box" pos="0.5 0 0.1" size="0.1 0.5 0.1"/></scene>
+<horizon duration="2"/><start key="stand" height="floor"/><goal key="stand" height="floor"><root pos="1 0 1.3"/></goal>
+<cost><posture dofs="all" at="end" weight="900"/></cost></problem>
+TEXT
+inspected 0 block.xml
+check "the guess runs into the block" grep -qE "^note: the guess runs into a solid, deepest [0-9.]+ mm at [0-9.]+ s: '.*' in 'block'" out
+inspected 0 "$root/problems/motions/turn-over/problem.xml"
+not_said "note: the guess runs"
+
 [ "$failed" -eq 0 ] && echo "$checks checks"
 exit "$failed"

@@ -182,8 +182,9 @@ double cav_command_clock(clockid_t clock);
 /// unless out is NULL. tried.c.
 int cav_command_tell_stopped(FILE *out, const char *folder);
 
-/// Says which waypoint of a guess is deepest inside something, if that is deep. preview.c.
-void cav_command_tell_guess(FILE *out, const cav_problem *problem);
+/// Says which waypoint of a guess is deepest inside something, if that is deep; whole: or else where all of it is
+/// deepest in a solid. preview.c.
+void cav_command_tell_guess(FILE *out, const cav_problem *problem, int whole);
 
 /// Tells of a step in which bodies fall far: milliseconds, perhaps, where seconds are meant. inspect.c.
 void cav_command_tell_step(FILE *out, const cav_problem *problem);

@@ -106,16 +106,29 @@ static char *told_of_repair(const char *folder) {
 
 typedef enum trial { NOT_TRIED, TRIED, STOPPED, WITH_OTHERS } trial;
 
-// whether a line's changes, in whose place of " stands ', begin with these; what follows, NULL: they do not
-static const char *after(const char *line, const char *changes) {
-  for (; *changes; changes++, line++)
-    if (*line != (*changes == '"' ? '\'' : *changes)) return NULL;
-  return line;
+// whether a text is in a line, where " and ' are the same
+static int is_among(const char *line, const char *text) {
+  for (; *line; line++) {
+    size_t k = 0;
+    while (text[k] && (line[k] == '"' ? '\'' : line[k]) == (text[k] == '"' ? '\'' : text[k])) k++;
+    if (!text[k]) return 1;
+  }
+  return 0;
 }
 
-static int is_among(const char *line, const char *changes) {
-  while (*line && !after(line, changes)) line++;
-  return *line != 0;
+// whether each of a line's changes, which commas part, is one of either list, or that solids grow
+static int is_made_of(const char *line, const char *list, const char *other) {
+  if (!*line) return 0;
+  while (*line) {
+    const size_t n = strcspn(line, ",");
+    char one[CAV_STRATEGY_CHANGES];
+    snprintf(one, sizeof one, "%.*s", (int)n, line);
+    for (char *c = one; *c; c++)
+      if (*c == '"') *c = '\'';
+    if (!is_among(list, one) && !is_among(other, one) && strcmp(one, "solids='grow'")) return 0;
+    line += n + strspn(line + n, ", ");
+  }
+  return 1;
 }
 
 // whether a strategy of the folder's solve made these changes of the folder's problem, or was stopped while it did
@@ -127,13 +140,10 @@ static trial was_tried(const char *folder, const char *changes) {
     if (t.kept) kept = strdup(t.changed);
   cav_tried_close(&t);
   t = cav_tried_open(folder);
-  while (what == NOT_TRIED && cav_tried_next(&t)) {
-    const char *rest = after(t.changed, changes);
-    if (!rest) continue;
-    // a solid's growth and what the kept motion changed are of the folder's problem already
-    if (kept && *kept && !strncmp(rest, ", ", 2) && after(rest + 2, kept)) rest = after(rest + 2, kept);
-    if (!*rest || !strcmp(rest, ", solids='grow'")) what = strcmp(t.outcome, "stopped") ? TRIED : STOPPED;
-  }
+  // a solid's growth and what the kept motion changed are of the folder's problem already
+  while (what == NOT_TRIED && cav_tried_next(&t))
+    if (is_made_of(t.changed, changes, kept ? kept : "") && is_made_of(changes, t.changed, ""))
+      what = strcmp(t.outcome, "stopped") ? TRIED : STOPPED;
   cav_tried_close(&t);
   t = cav_tried_open(folder);
   while (what == NOT_TRIED && cav_tried_next(&t))

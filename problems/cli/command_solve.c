@@ -314,7 +314,7 @@ static int solve_from(const cav_command_line *line, const cav_problem *problem, 
   if (!status && race.tell) cav_command_tell_equalities(stderr, problem);
   if (!status && race.tell) cav_command_tell_postures(stderr, problem);
   if (!status && race.tell) cav_command_tell_axes(stderr, problem);
-  if (!status && race.tell) cav_command_tell_guess(stderr, problem);
+  if (!status && race.tell) cav_command_tell_guess(stderr, problem, 0);
   if (!status && race.tell && !race.entry[0].strategy.stated)
     fprintf(stderr,
             "the way from start to goal runs into a solid or the ground and no waypoint of a <guess> leads over it: "

@@ -582,6 +582,7 @@ static cav_status print_problem(const cav_problem *p, int all, cav_error *error)
   cav_command_tell_postures(stdout, p);
   cav_command_tell_goal(stdout, p);
   cav_command_tell_axes(stdout, p);
+  cav_command_tell_guess(stdout, p, 1);
   if (p->duration_most > 0)
     printf("  duration free from %g to %g s, weight %g\n", p->duration_least, p->duration_most, p->duration_weight);
   if (p->cycle.on)

@@ -16,11 +16,22 @@ typedef struct penetration {
   int knot, pair;
 } penetration;
 
-static cav_status note_depth(const cav_model *m, cav_state *state, const double *q, int knot, penetration *p) {
+static int is_of_plane(const cav_model *m, int pair) {
+  return m->geom[m->pair[pair].geom1].type == CAV_GEOM_PLANE || m->geom[m->pair[pair].geom2].type == CAV_GEOM_PLANE;
+}
+
+// solids: planes do not count
+static cav_status note_depth_in(const cav_model *m, cav_state *state, const double *q, int knot, int solids,
+                                penetration *p) {
   cav_status status = cav_position(m, state, q);
   for (int i = 0; i < state->ncontact && !status; i++)
-    if (-state->contact[i].dist > p->depth) *p = (penetration){-state->contact[i].dist, knot, state->contact[i].pair};
+    if (-state->contact[i].dist > p->depth && !(solids && is_of_plane(m, state->contact[i].pair)))
+      *p = (penetration){-state->contact[i].dist, knot, state->contact[i].pair};
   return status;
+}
+
+static cav_status note_depth(const cav_model *m, cav_state *state, const double *q, int knot, penetration *p) {
+  return note_depth_in(m, state, q, knot, 0, p);
 }
 
 // "2.1 mm: 'a' in 'b'"
@@ -35,12 +46,12 @@ static void tell(const cav_model *m, const penetration *p, double timestep, int 
   snprintf(out, size, "deepest %.3g mm%s: '%.60s' in '%.60s'", 1e3 * p->depth, time, a, b);
 }
 
-void cav_command_tell_guess(FILE *out, const cav_problem *p) {
+void cav_command_tell_guess(FILE *out, const cav_problem *p, int whole) {
   static const double deep = 0.02; // m
   cav_error ignored = {0};
-  penetration ends = {0}, on_the_way = {0};
+  penetration ends = {0}, waypoints = {0}, way = {0};
   char text[200];
-  if (!p->nguess_pose) return;
+  if (!p->nguess_pose && !whole) return;
   cav_state *state = cav_state_new(p->model);
   cav_trajectory *guess = cav_problem_guess(p, &ignored);
   cav_status status = state && guess ? CAV_OK : CAV_NO_MEMORY;
@@ -48,12 +59,20 @@ void cav_command_tell_guess(FILE *out, const cav_problem *p) {
   if (!status) status = note_depth(p->model, state, p->q_goal, 0, &ends);
   for (int k = 0; !status && k < p->nguess_pose; k++) {
     const int t = (int)lround(p->guess_pose[k].time / p->timestep);
-    if (t < guess->nknot)
-      status = note_depth(p->model, state, guess->q + (size_t)t * (size_t)guess->nq, t, &on_the_way);
+    if (t < guess->nknot) status = note_depth(p->model, state, guess->q + (size_t)t * (size_t)guess->nq, t, &waypoints);
   }
-  if (!status && on_the_way.depth > fmax(deep, ends.depth)) {
-    tell(p->model, &on_the_way, p->timestep, 1, text, sizeof text);
+  for (int t = 0; !status && t < guess->nknot && whole; t++)
+    status = note_depth_in(p->model, state, guess->q + (size_t)t * (size_t)guess->nq, t, 1, &way);
+  if (!status && waypoints.depth > fmax(deep, ends.depth)) {
+    tell(p->model, &waypoints, p->timestep, 1, text, sizeof text);
     fprintf(out, "note: a waypoint of the guess is inside something, %s; cavort view PROBLEM shows it\n", text);
+  } else if (!status && way.depth > fmax(deep, ends.depth)) {
+    tell(p->model, &way, p->timestep, 1, text, sizeof text);
+    fprintf(
+        out,
+        "note: the guess runs into a solid, %s (cavort view PROBLEM shows it): solve looks for a way over or round it, "
+        "or give <waypoint>s\n",
+        text);
   }
   cav_trajectory_free(guess);
   cav_state_free(state);
