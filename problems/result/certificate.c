@@ -80,7 +80,7 @@ int cav_certificate_lines(const cav_verdict *v, cav_certificate_line line[CAV_CE
   add_number(line, &n, "under the model's contact parameters, error at the end", v->model_contacts_end_error_m, NAN,
              1e3, " mm");
   add_number(line, &n, "push survived there, along x and y", v->push_survived_n_s, NAN, 1, " N s");
-  add_number(line, &n, "effort asked for in closed loop, of the limit", v->feedback_effort_max, NAN, 100, " %");
+  add_number(line, &n, "effort asked for in closed loop, clipped", v->feedback_effort_max, NAN, 100, " %");
   add_number(line, &n, "open loop at the same step, largest error", v->replay_same_step_max_error, NAN, 1, "");
   add_number(line, &n, "power of an actuator, largest", v->power_max_w, NAN, 1, " W");
   add_number(line, &n, "speed of a joint that turns, largest", v->joint_speed_max_rad_s, NAN, 1, " rad/s");
@@ -88,7 +88,7 @@ int cav_certificate_lines(const cav_verdict *v, cav_certificate_line line[CAV_CE
     add_number(line, &n, "speed of a joint that slides, largest", v->slide_speed_max_m_s, NAN, 1, " m/s");
   if (!isnan(v->joint_speed_over_limit))
     add_number(line, &n, "speed of a joint over the limit in its file", v->joint_speed_over_limit, NAN, 1, "");
-  add_number(line, &n, "cost that a step may still save, fraction", v->optimality, NAN, 1, "");
+  add_number(line, &n, "cost that a step may still save", v->optimality, NAN, 100, " %");
   return n;
 }
 
@@ -158,15 +158,15 @@ void cav_certificate_print(FILE *out, const cav_problem *problem, const cav_verd
   fprintf(out, "%scost %.6g", isnan(v->solve_seconds) ? "  " : ", ", v->cost);
   fprintf(out, problem->duration_most > 0 ? ", duration %.8g s\n" : "\n", v->duration);
   char optimality[32];
-  write_apart(optimality, 1, v->optimality, CAV_TOLERANCE_OPTIMAL);
+  write_apart(optimality, 2, 100 * v->optimality, 100 * CAV_TOLERANCE_OPTIMAL);
   fputs(cav_verdict_feasible(v) ? "feasible" : "NOT feasible", out);
   if (isnan(v->optimality))
     fprintf(out, ", how optimal is not known\n");
   else if (cav_verdict_optimal(v))
-    fprintf(out, ", locally optimal: a step saves no more than %s of the cost\n", optimality);
+    fprintf(out, ", locally optimal: a step saves no more than %s %% of the cost\n", optimality);
   else
-    fprintf(out, "; a step may still save %s of the cost (locally optimal: no more than %g)\n", optimality,
-            CAV_TOLERANCE_OPTIMAL);
+    fprintf(out, "; a step may still save %s %% of the cost (locally optimal: no more than %g %%)\n", optimality,
+            100 * CAV_TOLERANCE_OPTIMAL);
   const double asked = problem->schedule.optimality;
   if (asked > 0 && v->optimality > asked)
     fprintf(out, "  the problem asks for %g (<schedule optimality>): not reached; --solver both goes on by Ipopt\n",
@@ -202,7 +202,8 @@ void cav_certificate_print(FILE *out, const cav_problem *problem, const cav_verd
     fprintf(
         out,
         "  note: certified at the edge: its closed loop ends up to %.2g m off (from %g it is lost) and asks for up to "
-        "%.3g %% of what an actuator gives; %sless <limits effort> or a longer motion make it surer\n",
+        "%.3g %% of what an actuator gives, where it gets 100; %sless <limits effort> or a longer motion make it "
+        "surer\n",
         astray, CAV_LOST_DISTANCE, 100 * v->feedback_effort_max,
         has_force_cost(problem) ? "" : "<force weight=\"1\"/>, ");
   if (v->end_body[0])
