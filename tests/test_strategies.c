@@ -59,7 +59,7 @@ static void test_through_ground(void) {
   CHECK(
       offers(p,
              "stated near-1 near-2 near-3 near-4 soft line slow momentum near-5 near-6 near-7 near-8 repair-1 repair-2 "
-             "repair-3 repair-4 open longer"));
+             "repair-3 repair-4 open longer stronger"));
   p->guess_height = 0.3, p->guess_from = 1, p->guess_to = 2;
   CHECK(cav_strategy_list(p, strategy, &n) == CAV_OK && strategy[0].stated);
   cav_problem_free(p);
@@ -149,7 +149,7 @@ static void test_gait(const char *text, double axis, double travel) {
       p.guess_height = k == 2 ? 0.3 : 0;
       snprintf(list, sizeof list,
                "stated near-1 near-2 near-3 near-4 soft %sslow momentum near-5 near-6 near-7 near-8 repair-1 repair-2 "
-               "repair-3 repair-4 open longer",
+               "repair-3 repair-4 open longer stronger",
                way[k][back]);
       CHECK(offers(&p, list));
     }
@@ -160,7 +160,7 @@ static void test_gait(const char *text, double axis, double travel) {
   CHECK(offers(
       &p,
       "stated near-1 near-2 near-3 near-4 soft line hold slow momentum near-5 near-6 near-7 near-8 repair-1 repair-2 "
-      "repair-3 repair-4 open longer"));
+      "repair-3 repair-4 open longer stronger"));
   // taking one leaves the problem as it was
   CHECK(cav_strategy_list(&p, strategy, &n) == CAV_OK);
   cav_strategy_apply(&p, &strategy[0], &taken);
@@ -170,6 +170,9 @@ static void test_gait(const char *text, double axis, double travel) {
   cav_strategy_apply(&p, find(strategy, n, "longer"), &taken);
   CHECK(taken.nswing == 1 && taken.duration_least == p.duration && taken.duration_most == 2 * p.duration);
   CHECK(find(strategy, n, "longer")->use == CAV_STRATEGY_DIAGNOSIS && p.duration_most == 0);
+  cav_strategy_apply(&p, find(strategy, n, "stronger"), &taken);
+  CHECK(taken.effort_limit == 2 * p.effort_limit && taken.duration_most == 0);
+  CHECK(find(strategy, n, "stronger")->use == CAV_STRATEGY_DIAGNOSIS);
   cav_strategy_apply(&p, find(strategy, n, "momentum"), &taken);
   CHECK(taken.order == CAV_ORDER_MOMENTUM && taken.duration_most == 0 && p.order == CAV_ORDER_MIDPOINT);
   cav_strategy_apply(&p, find(strategy, n, "hold"), &taken);
@@ -247,7 +250,7 @@ static void check_order(cav_problem *p) {
       offers(p,
              "stated near-1 near-2 near-3 near-4 midpoint posture soft hold slow near-5 near-6 near-7 near-8 repair-1 "
              "repair-2 repair-3 "
-             "repair-4 open longer"));
+             "repair-4 open longer stronger"));
   CHECK(cav_strategy_list(p, strategy, &n) == CAV_OK);
   cav_solution *straight = NULL, *round = NULL;
   runs = first_stall = last_stall = 0;
@@ -374,7 +377,7 @@ static void test_solids(void) {
   CHECK(offers(&p,
                "stated near-1 near-2 near-3 near-4 solids near-5 near-6 flight near-7 near-8 repair-1 repair-2 "
                "repair-3 repair-4 soft hold slow momentum near-9 near-10 near-11 near-12 "
-               "open longer"));
+               "open longer stronger"));
   cav_strategy strategy[CAV_STRATEGIES];
   int n;
   CHECK(cav_strategy_list(&p, strategy, &n) == CAV_OK && !strategy[0].stated);
@@ -387,7 +390,7 @@ static void test_solids(void) {
   CHECK(offers(&p,
                "stated near-1 near-2 near-3 near-4 step near-5 near-6 solids near-7 near-8 repair-1 repair-2 repair-3 "
                "repair-4 soft line hold slow momentum "
-               "near-9 near-10 near-11 near-12 open longer"));
+               "near-9 near-10 near-11 near-12 open longer stronger"));
   CHECK(cav_strategy_list(&p, strategy, &n) == CAV_OK && strategy[0].schedule.solids == CAV_SOLIDS_HARD);
   cav_strategy_apply(&p, find(strategy, n, "step"), &taken);
   CHECK(taken.nswing == 4 && taken.schedule.solids == CAV_SOLIDS_GROW);
@@ -402,7 +405,7 @@ static void test_solids(void) {
   CHECK(offers(&p,
                "stated near-1 near-2 near-3 near-4 soft hold slow momentum near-5 near-6 near-7 near-8 repair-1 "
                "repair-2 repair-3 "
-               "repair-4 open longer"));
+               "repair-4 open longer stronger"));
   cav_model_free(m);
 }
 
@@ -459,7 +462,7 @@ static void test_cycle(void) {
   CHECK(offers(
       p,
       "stated near-1 near-2 near-3 near-4 soft slow momentum near-5 near-6 near-7 near-8 repair-1 repair-2 repair-3 "
-      "repair-4"));
+      "repair-4 stronger"));
   cav_strategy stated = {.name = "stated", .stated = 1, .order = p->order, .schedule = p->schedule}, mended;
   const cav_verdict slides = {.slip_mean_m_s = 0.0105, .closed_loop_seconds = p->duration};
   int found = 0;

@@ -37,7 +37,17 @@ static const double wide = 1.6, leisure = 0.6;
 
 /// How much softer and how much slower than stated, how much longer a diagnosis may last, how many
 /// repairs there are at the end, and of what is nearly there by the stated guess and by another one.
-enum { SOFTER = 2, CHEAPER = 10, SLOWER = 2, LONGER = 2, STRONGER = 2, REPAIRS = 4, MEND_STATED = 4, MEND = 2, MEND_LAST = 4 };
+enum {
+  SOFTER = 2,
+  CHEAPER = 10,
+  SLOWER = 2,
+  LONGER = 2,
+  STRONGER = 2,
+  REPAIRS = 4,
+  MEND_STATED = 4,
+  MEND = 2,
+  MEND_LAST = 4
+};
 
 /// What the duration of a diagnosis costs, 1/s², so that it is not far from the shortest.
 static const double haste = 100;
@@ -546,11 +556,11 @@ static void add_diagnoses(const cav_problem *problem, cav_strategy *strategy, in
   stronger.effort_limit = STRONGER * problem->effort_limit;
   if (!problem->cycle.on && problem->close_at_rest)
     add(strategy, n, &open, "open", "with an end that need not be at rest");
-  if (problem->model->nu > 0 && !fixed) add(strategy, n, &stronger, "stronger", "with actuators twice as strong");
   int timed = problem->window > 0;
   for (int i = 0; i < problem->nterm; i++) timed |= problem->term[i].quantity == CAV_QUANTITY_TRACK;
   if (!problem->cycle.on && problem->duration_most == 0 && !fixed && !timed)
     add(strategy, n, &longer, "longer", "with a duration free up to twice the stated one");
+  if (problem->model->nu > 0 && !fixed) add(strategy, n, &stronger, "stronger", "with actuators twice as strong");
 }
 
 cav_status cav_strategy_list(const cav_problem *problem, cav_strategy strategy[CAV_STRATEGIES], int *n) {

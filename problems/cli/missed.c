@@ -83,8 +83,9 @@ static double times_of(const char *changed, const char *name) {
   return at ? strtod(at + strlen(one), NULL) : all ? strtod(all + sizeof goals - 1, NULL) : 1;
 }
 
-static const double plenty =
-    5; // times its weight from which on a trial in vain tells that weight is not what is missing
+// times its weight from which on a trial in vain tells that weight is not what is missing
+static const double plenty = 5;
+static const double nearer = 0.95; // part of what is missed that a trial leaves where it helped
 static const double counts = 0.02; // part of the cost from which on another target is told to be in the way
 
 /// Another target that costs most, in words that go on from a weight's; "" where none counts.
@@ -102,9 +103,9 @@ static void tell_opponent(const cav_problem *p, const cav_term_report *report, i
 
 /// What became of the heaviest weight of a term that was tried, where that is by so many times more than that of the motion
 /// that was kept, or is its own: in words, "" where no such was.
-static void tell_heavier(const char *folder, const char *name, double more, char *text, size_t size) {
+static void tell_heavier(const char *folder, const char *name, double more, double off, char *text, size_t size) {
   cav_tried t = cav_tried_open(folder);
-  double most = 1, kept = 1;
+  double most = 1, kept = 1, left = NAN;
   char how[160] = "";
   *text = 0;
   while (cav_tried_next(&t)) {
@@ -115,9 +116,14 @@ static void tell_heavier(const char *folder, const char *name, double more, char
     const char *end = strstr(t.reason, ": wanted"), *stop = strstr(t.reason, ". ");
     if (!end || (stop && stop < end)) end = stop;
     snprintf(how, sizeof how, "%.*s", end ? (int)(end - t.reason) : (int)strlen(t.reason), t.reason);
+    left = NAN;
+    const char *by = strstr(t.reason, "' by ");
+    if (by) sscanf(by, "' by %lf", &left);
   }
   cav_tried_close(&t);
-  if (*how && most > kept && most >= 0.99 * fmin(more, plenty) * kept)
+  // one that brought it nearer tells nothing against more
+  const int helped = left < nearer * off;
+  if (*how && most > kept && (most >= 0.99 * more * kept || (most >= plenty * kept && !helped)))
     snprintf(text, size, "%g times the stated weight was tried (strategies.csv) and did not do: %s", most, how);
 }
 
@@ -321,7 +327,7 @@ static void tell(const cav_problem *p, const cav_trajectory *motion, const cav_t
     snprintf(s.ended, sizeof s.ended, "short of an optimum, where a step may still save %.2g %% of the cost",
              100 * saving);
   const int stays = s.done < still * s.way && s.way > got[i].within;
-  tell_heavier(folder, s.term->name, stays ? 1 : more, s.tried, sizeof s.tried);
+  tell_heavier(folder, s.term->name, stays ? 1 : more, got[i].off, s.tried, sizeof s.tried);
   snprintf(s.weight, sizeof s.weight, "a weight %.2g times as large brings it nearer", more);
   if (*s.tried) snprintf(s.weight, sizeof s.weight, "%s", s.tried);
   const size_t said = strlen(s.weight);

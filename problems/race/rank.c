@@ -19,8 +19,8 @@ static const double cheaper = 1e-4, worth = 1e-2;
 // force without an actuator, fraction of the weight, and violation of limits and constraints up to which it nearly keeps them
 static const double nearly = 5e-3;
 
-// part of the cost from which on what nearly keeps these is nearer to what was asked than one that is certified and does something
-// else: what is missed is in the cost
+// part of the cost from which on what nearly keeps these is nearer to what was asked than one that is certified and does
+// something else: what is missed is in the cost
 static const double undone = 0.1;
 
 static int misses_little(const cav_verdict *v) { return v->missed_most > 0 && v->missed_most < CAV_MISSED_LITTLE; }
