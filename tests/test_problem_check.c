@@ -97,6 +97,8 @@ static void test_problem(void) {
   REFUSED(t.problem.timestep = NAN, "horizon");
   REFUSED(t.problem.limit_margin = NAN, "limit_margin");
   REFUSED(t.problem.effort_limit = 2, "effort_limit");
+  REFUSED(t.problem.strength = -1, "strength");
+  REFUSED(t.problem.strength = INFINITY, "strength");
   REFUSED(t.problem.guess_height = NAN, "guess_height");
   REFUSED((t.problem.nguess_pose = 2, t.problem.guess_pose = t.pose, t.pose[1].time = 0.05), "guess_pose[1]");
   REFUSED((t.problem.nguess_pose = 2, t.problem.guess_pose = t.pose, t.pose[1].q = NULL), "guess_pose[1]");

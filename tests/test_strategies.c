@@ -171,7 +171,7 @@ static void test_gait(const char *text, double axis, double travel) {
   CHECK(taken.nswing == 1 && taken.duration_least == p.duration && taken.duration_most == 2 * p.duration);
   CHECK(find(strategy, n, "longer")->use == CAV_STRATEGY_DIAGNOSIS && p.duration_most == 0);
   cav_strategy_apply(&p, find(strategy, n, "stronger"), &taken);
-  CHECK(taken.effort_limit == 2 * p.effort_limit && taken.duration_most == 0);
+  CHECK(taken.strength == 2 && taken.effort_limit == p.effort_limit && taken.duration_most == 0 && p.strength == 0);
   CHECK(find(strategy, n, "stronger")->use == CAV_STRATEGY_DIAGNOSIS);
   cav_strategy_apply(&p, find(strategy, n, "momentum"), &taken);
   CHECK(taken.order == CAV_ORDER_MOMENTUM && taken.duration_most == 0 && p.order == CAV_ORDER_MIDPOINT);

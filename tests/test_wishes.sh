@@ -147,10 +147,10 @@ cat >dash.xml <<'E2'
 E2
 "$cavort" solve dash.xml --force --threads 1 -o dash >dash.out 2>dash.err
 ends $? 1 "a metre in half a second by a weak motor"
-says dash.err "but a motion is found where they give up to 1.6 of them: the model is too weak for this"
-says dash/strategies.csv "1.6 of the efforts would do"
+says dash.err "but a motion is found where they are 2 times as strong: the model is too weak for this"
+says dash/strategies.csv "2 times the strength would do"
 "$cavort" explain dash >explain.out
-says explain.out "but a motion is found where they give up to 1.6 of them"
+says explain.out "but a motion is found where they are 2 times as strong"
 
 # a record of a joint given as a guess: how its column has to be called there
 printf 'time,rail\n0,0\n1,0.5\n' >record.csv

@@ -384,18 +384,18 @@ typedef struct cav_problem {
   cav_residual residual;          ///< forces on roots that are penalised
   int nparameter;                 ///< numbers of the model that are not known
   const cav_parameter *parameter; ///< [nparameter] found by cav_estimate_solve; all else takes the model as it is
-  /// Fraction of the actuator limits planned with, > 0; above 1 (files: at most 1) motion and certificate are of actuators that
-  /// are so much stronger.
-  double effort_limit;
-  double limit_margin;           ///< rad or m kept from joint and tendon limits in planning
-  cav_schedule schedule;         ///< of the continuation
-  int nipopt;                    ///< options for Ipopt, where it is the solver
-  const cav_ipopt_option *ipopt; ///< [nipopt]
-  int solved;                    ///< 1: read from a result folder, contact holds
-  cav_options contact;           ///< the law that the recorded motion obeys, for verification; solving does not use it
-  const char *model_path;        ///< file the model was read from; NULL: made in C
-  int floating;                  ///< 1: the root link of that file, a URDF, floats
-  void *owner;                   ///< memory of a problem read from a file
+  double effort_limit;            ///< fraction of the actuator limits planned with, 0 .. 1
+  double strength;                ///< times their limits that actuators are taken to have, of a diagnosis; 0: once. The
+                                  ///< certificate is of such actuators
+  double limit_margin;            ///< rad or m kept from joint and tendon limits in planning
+  cav_schedule schedule;          ///< of the continuation
+  int nipopt;                     ///< options for Ipopt, where it is the solver
+  const cav_ipopt_option *ipopt;  ///< [nipopt]
+  int solved;                     ///< 1: read from a result folder, contact holds
+  cav_options contact;            ///< the law that the recorded motion obeys, for verification; solving does not use it
+  const char *model_path;         ///< file the model was read from; NULL: made in C
+  int floating;                   ///< 1: the root link of that file, a URDF, floats
+  void *owner;                    ///< memory of a problem read from a file
 } cav_problem;
 
 /// A term with what files give one that says no more: its element's name, over the whole horizon, of all joints but free

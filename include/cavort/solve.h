@@ -359,6 +359,7 @@ typedef struct cav_strategy {
   cav_guess_pose pose[2];               ///< where it flies
   cav_schedule schedule;                ///< schedule that it takes
   double effort_limit, timestep;        ///< those of the problem where 0
+  double strength;                      ///< a diagnosis: cav_problem.strength
   int open;                             ///< 1: a diagnosis that need not end at rest; 0: one that may last longer
   int nterm;                            ///< number of the changed terms
   cav_term *term; ///< [nterm] in the place of the problem's, whose names and targets they borrow; NULL

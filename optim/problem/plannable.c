@@ -8,8 +8,6 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
-#include "cavort/problem.h"
-
 static int is_scalar(const cav_model *model, int joint) {
   return model->joint[joint].type == CAV_JOINT_HINGE || model->joint[joint].type == CAV_JOINT_SLIDE;
 }
@@ -63,6 +61,10 @@ static double memory_most(void) {
     if (getrlimit(limits[i], &limit) == 0 && limit.rlim_cur != RLIM_INFINITY) most = fmin(most, (double)limit.rlim_cur);
   }
   return most;
+}
+
+double cav_planned_part(const cav_problem *problem) {
+  return problem->strength > 0 ? problem->strength * problem->effort_limit : problem->effort_limit;
 }
 
 double cav_knots_bytes(double knots, int dofs) {

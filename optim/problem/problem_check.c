@@ -44,8 +44,10 @@ static cav_status check_horizon(const cav_problem *p, cav_error *error) {
     wrong = "free_start is for a motion with a start; that of a cycle is free as it is";
   else if (!(p->timestep > 0) || !(p->duration >= 2 * p->timestep) || !isfinite(p->duration))
     wrong = "the horizon needs a positive timestep and at least two steps";
-  else if (!(p->effort_limit > 0) || isinf(p->effort_limit))
-    wrong = "effort_limit must be positive and finite";
+  else if (!(p->effort_limit > 0) || p->effort_limit > 1)
+    wrong = "effort_limit must be in (0, 1]";
+  else if (!(p->strength >= 0) || isinf(p->strength))
+    wrong = "strength must not be negative";
   else if (!(p->limit_margin >= 0) || !isfinite(p->limit_margin))
     wrong = "limit_margin must not be negative";
   else if (!(p->residual.force >= 0) || !(p->residual.torque >= 0) || !(p->residual.within >= 0) ||

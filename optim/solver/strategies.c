@@ -553,14 +553,15 @@ static void add_diagnoses(const cav_problem *problem, cav_strategy *strategy, in
                           int fixed) {
   cav_strategy open = *stated, stronger = *stated, longer = *stated;
   open.use = stronger.use = longer.use = CAV_STRATEGY_DIAGNOSIS, open.open = 1;
-  stronger.effort_limit = STRONGER * problem->effort_limit;
+  stronger.strength = STRONGER;
   if (!problem->cycle.on && problem->close_at_rest)
     add(strategy, n, &open, "open", "with an end that need not be at rest");
   int timed = problem->window > 0;
   for (int i = 0; i < problem->nterm; i++) timed |= problem->term[i].quantity == CAV_QUANTITY_TRACK;
   if (!problem->cycle.on && problem->duration_most == 0 && !fixed && !timed)
     add(strategy, n, &longer, "longer", "with a duration free up to twice the stated one");
-  if (problem->model->nu > 0 && !fixed) add(strategy, n, &stronger, "stronger", "with actuators twice as strong");
+  if (problem->model->nu > 0 && !fixed && !timed)
+    add(strategy, n, &stronger, "stronger", "with actuators twice as strong");
 }
 
 cav_status cav_strategy_list(const cav_problem *problem, cav_strategy strategy[CAV_STRATEGIES], int *n) {
@@ -598,10 +599,11 @@ void cav_strategy_apply(const cav_problem *problem, const cav_strategy *strategy
   taken->order = strategy->order;
   if (strategy->timestep > 0) taken->timestep = strategy->timestep;
   if (strategy->effort_limit > 0) taken->effort_limit = strategy->effort_limit;
+  if (strategy->strength > 0) taken->strength = strategy->strength;
   if (strategy->term) taken->term = strategy->term, taken->nterm = strategy->nterm;
   if (strategy->open) {
     taken->close_at_rest = 0;
-  } else if (strategy->use == CAV_STRATEGY_DIAGNOSIS && strategy->effort_limit <= 0) {
+  } else if (strategy->use == CAV_STRATEGY_DIAGNOSIS && strategy->strength == 0) {
     taken->duration_least = problem->duration;
     taken->duration_most = LONGER * problem->duration;
     taken->duration_weight = haste;

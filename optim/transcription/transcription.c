@@ -63,7 +63,7 @@ static int force_row_set(cav_force_row *row, int nv, const double *dense, double
 static int limit_row_set(cav_transcription *tr, int k, const double *effort) {
   const cav_model *m = tr->model;
   int a = tr->limited[k], servo = cav_servo_bounds(m, a) && (k >= m->nu || !m->actuator[a].forcelimited);
-  double range[2], per_effort = 1, part = tr->problem->effort_limit;
+  double range[2], per_effort = 1, part = cav_planned_part(tr->problem);
   cav_actuator_effort_range(m, a, range);
   if (servo && !cav_servo_set(m, a, &tr->servo[k], &per_effort, range)) return 0;
   if (servo && m->actuator[a].forcelimited) part = 1;

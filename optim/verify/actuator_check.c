@@ -10,6 +10,11 @@
 #include "objects.h"
 #include "verification.h"
 
+// part of the limits that is planned with, of actuators that are so many times as strong
+static double planned_part(const cav_problem *p) {
+  return p->strength > 0 ? p->strength * p->effort_limit : p->effort_limit;
+}
+
 // limits of the input; 0 where there are none
 static int input_range(const cav_actuator *a, double range[2]) {
   int integrated = a->activation == CAV_ACTIVATION_INTEGRATOR;
@@ -66,7 +71,7 @@ cav_status cav_verification_actuators(const cav_model *model, cav_error *error) 
 static void plan_input(const cav_verification *verification, const cav_actuator *a, double range[2]) {
   if (a->forcelimited) return;
   double middle = (range[0] + range[1]) / 2;
-  for (int k = 0; k < 2; k++) range[k] = middle + (range[k] - middle) * verification->problem->effort_limit;
+  for (int k = 0; k < 2; k++) range[k] = middle + (range[k] - middle) * planned_part(verification->problem);
 }
 
 // the input of a servo that an effort takes at the state and a velocity
@@ -86,7 +91,7 @@ void cav_verification_effort(const cav_verification *verification, int t, int ac
   char words[CAV_WORDS];
   double range[2], scale;
   cav_verification_actuator_range(model, actuator, range, &scale);
-  const double planned = verification->problem->effort_limit;
+  const double planned = planned_part(verification->problem);
   range[0] *= planned, range[1] *= planned;
   cav_metric_note(metric, fmax(range[0] - effort, effort - range[1]) / scale, t, "%s%.60s at %.4g of %.4g .. %.4g%s",
                   *a->name ? "actuator " : "", cav_actuator_words(model, actuator, words), effort, range[0], range[1],
@@ -117,7 +122,7 @@ int cav_verification_effort_rows(const cav_model *model, int actuator) {
 double cav_verification_effort_row(const cav_verification *verification, int actuator, int component, double effort,
                                    const double *v, double *moment, double range[2]) {
   const cav_actuator *a = verification->model->actuator + actuator;
-  double scale, value = effort, part = verification->problem->effort_limit;
+  double scale, value = effort, part = planned_part(verification->problem);
   cav_verification_actuator_range(verification->model, actuator, range, &scale);
   if (a->bias != CAV_BIAS_NONE && (component > 0 || !a->forcelimited) && input_range(a, range)) {
     value = servo_input(verification, actuator, effort, v, moment);

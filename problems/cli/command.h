@@ -164,7 +164,7 @@ void cav_command_tell_tried(FILE *out, const char *folder);
 /// What a diagnosis changes in a problem.
 typedef enum cav_would_do {
   CAV_WOULD_DO_DURATION, ///< value, s
-  CAV_WOULD_DO_EFFORT,   ///< value, a multiple of the actuators' limits
+  CAV_WOULD_DO_STRENGTH, ///< value, times that of the actuators
   CAV_WOULD_DO_OPEN_END  ///< none
 } cav_would_do;
 

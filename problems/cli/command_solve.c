@@ -267,12 +267,12 @@ static void tell_cause(const cav_race *race) {
   for (int i = 0; i < race->n; i++) {
     const cav_race_entry *e = &race->entry[i];
     if (!cav_race_would_do(e)) continue;
-    const int stronger = e->strategy.effort_limit > 0;
+    const int stronger = e->strategy.strength > 0;
     const cav_would_do what = e->strategy.open ? CAV_WOULD_DO_OPEN_END
-                              : stronger       ? CAV_WOULD_DO_EFFORT
+                              : stronger       ? CAV_WOULD_DO_STRENGTH
                                                : CAV_WOULD_DO_DURATION;
     cav_command_tell_would_do(stderr, "cavort: ", p, what,
-                              stronger ? e->strategy.effort_limit : e->report.verdict.duration);
+                              stronger ? e->strategy.strength : e->report.verdict.duration);
   }
 }
 

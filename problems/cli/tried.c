@@ -25,11 +25,12 @@ void cav_command_tell_would_do(FILE *out, const char *before, const cav_problem 
           "long: <horizon duration=\"%.4g\" range=\"%.4g %.4g\"/>\n",
           before, p->duration, value, p->duration, p->duration, 2 * p->duration);
       break;
-    case CAV_WOULD_DO_EFFORT:
+    case CAV_WOULD_DO_STRENGTH:
       fprintf(
           out,
-          "%snot with actuators up to %.3g of their limits, but a motion is found where they give up to %.3g of them: "
-          "the model is too weak for this, or nearly so; %sless that is asked for, more time, or stronger actuators\n",
+          "%snot with these actuators, up to %.3g of their limits, but a motion is found where they are %.3g times as "
+          "strong: the model is too weak for this, or nearly so; %sless that is asked for, more time, or stronger "
+          "ones\n",
           before, p->effort_limit, value, p->effort_limit < 1 ? "<limits effort=\"1\"/>, " : "");
       break;
     case CAV_WOULD_DO_OPEN_END:
@@ -50,8 +51,8 @@ void cav_command_tell_diagnoses(FILE *out, const char *folder, const cav_problem
     if (!strcmp(t.reason, "an open end would do")) cav_command_tell_would_do(out, "", p, CAV_WOULD_DO_OPEN_END, 0);
     if (sscanf(t.reason, "%lf s would do%n", &value, &end) == 1 && end)
       cav_command_tell_would_do(out, "", p, CAV_WOULD_DO_DURATION, value);
-    if (sscanf(t.reason, "%lf of the efforts would do%n", &value, &end) == 1 && end)
-      cav_command_tell_would_do(out, "", p, CAV_WOULD_DO_EFFORT, value);
+    if (sscanf(t.reason, "%lf times the strength would do%n", &value, &end) == 1 && end)
+      cav_command_tell_would_do(out, "", p, CAV_WOULD_DO_STRENGTH, value);
   }
   cav_tried_close(&t);
 }

@@ -422,7 +422,7 @@ int cav_race_would_do(const cav_race_entry *entry) {
   if (entry->strategy.use != CAV_STRATEGY_DIAGNOSIS || entry->state != CAV_RACE_DONE || !entry->report.solution)
     return 0;
   // what is all but certified is within that strength
-  return cav_race_success(&entry->report) || (entry->strategy.effort_limit > 0 && v->achieved && cav_rank_rough(v));
+  return cav_race_success(&entry->report) || (entry->strategy.strength > 0 && v->achieved && cav_rank_rough(v));
 }
 
 int cav_race_success(const cav_race_report *report) { return report->verdict.certified && report->verdict.achieved; }
@@ -697,8 +697,8 @@ cav_status cav_race_write(const cav_race *race, int kept, const char *path, cav_
     if (would_do) {
       if (e->strategy.open)
         snprintf(missed, sizeof missed, "an open end would do");
-      else if (e->strategy.effort_limit > 0)
-        snprintf(missed, sizeof missed, "%.3g of the efforts would do", e->strategy.effort_limit);
+      else if (e->strategy.strength > 0)
+        snprintf(missed, sizeof missed, "%.3g times the strength would do", e->strategy.strength);
       else
         snprintf(missed, sizeof missed, "%.4g s would do", v->duration);
     }
