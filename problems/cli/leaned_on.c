@@ -291,12 +291,12 @@ static void tell_hovering(FILE *out, const cav_problem *problem, const cav_traje
   cav_state_free(state);
 }
 
-// part of the weight that may be left to brake at an end at rest and is not told of
+// m/s that the last step may take away at an end at rest without that being told
 static const double braking = 0.1;
 
 /// A tree that floats and that nothing holds at the end, where all is to be at rest: at the top of a hop it is, for a moment;
-/// or that forces brake there, which a tolerance of the velocity lets them do.
-static void tell_ending(FILE *out, const cav_problem *problem, const cav_forces *forces) {
+/// or that forces stop in the last step alone, which a tolerance of the velocity lets them do.
+static void tell_ending(FILE *out, const cav_problem *problem, const cav_forces *forces, double timestep) {
   const cav_model *m = problem->model;
   if (!problem->close_at_rest || problem->cycle.on || m->nequality || m->density > 0 || m->viscosity > 0 ||
       !(m->gravity[2] < 0))
@@ -314,6 +314,7 @@ static void tell_ending(FILE *out, const cav_problem *problem, const cav_forces 
       for (int k = 0; k < 3; k++) borne[k] += ((other == root) - (one == root)) * f->force[k];
     }
     const double weight = mass * -m->gravity[2], left = hypot(hypot(borne[0], borne[1]), borne[2] - weight);
+    const double stopped = left / mass * timestep;
     const char *name = or_else(m->body[m->link[root].body].name, "a body");
     char held[160] = "";
     for (int j = 0; j < m->njoint && !m->link[root].driven && !*held; j++)
@@ -327,12 +328,12 @@ static void tell_ending(FILE *out, const cav_problem *problem, const cav_forces 
           "A posture held over the last tenth of the time (from=), or a smaller within of the final velocity%s, makes "
           "it stand\n",
           name, held);
-    else if (left > braking * weight)
-      fprintf(
-          out,
-          "  note: '%.60s' is no more than braked at the end, by %.3g N of its %.3g N: a posture held over the last "
-          "tenth of the time (from=), or a smaller within of the final velocity, has it stand\n",
-          name, left, weight);
+    else if (stopped > braking)
+      fprintf(out,
+              "  note: '%.60s' moves at %.2g m/s until the last step, which stops it: that it stands is not seen. A "
+              "posture "
+              "held over the last tenth of the time (from=), or a smaller within of the final velocity, has it stand\n",
+              name, stopped);
   }
 }
 
@@ -360,7 +361,7 @@ void cav_command_tell_leaning(FILE *out, const cav_problem *problem, const cav_t
             size_of(most[g]), most[g]->knot * motion->timestep);
   }
   if (n > 0) fprintf(out, "; where it must not be touched: guide.md, Obstacles\n");
-  if (forces) tell_ending(out, problem, forces), tell_self(out, problem, forces, motion, weight);
+  if (forces) tell_ending(out, problem, forces, motion->timestep), tell_self(out, problem, forces, motion, weight);
   if (forces && problem->guess_height > 0 && !is_in_the_air(m, forces, weight))
     fprintf(
         out,
