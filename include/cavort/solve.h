@@ -360,8 +360,8 @@ typedef struct cav_strategy {
   cav_schedule schedule;                ///< schedule that it takes
   double effort_limit, timestep;        ///< those of the problem where 0
   double strength;                      ///< a diagnosis: cav_problem.strength
-  int open;                             ///< 1: a diagnosis that need not end at rest; 0: one that may last longer
-  int nterm;                            ///< number of the changed terms
+  int open;       ///< 1: a diagnosis that need not end at rest; 0 without strength: may last longer
+  int nterm;      ///< number of the changed terms
   cav_term *term; ///< [nterm] in the place of the problem's, whose names and targets they borrow; NULL
   char changed[CAV_STRATEGY_CHANGES]; ///< what a repair changes in the problem, in words
 } cav_strategy;
@@ -425,10 +425,9 @@ typedef struct cav_term_report {
   double time;        ///< s, of the knot at which it is missed most; of the value missed most there:
   double wanted, got; ///< its target (of a range the nearest value allowed) and itself, in unit
   double off;         ///< distance: of a sensor's vector its length, of dofs the largest
-  double
-      off_alone; ///< of the component that wanted and got are of: less than off where others of a vector are off, too
-  double within; ///< tolerance: the term's, or for goals at one time a usual one; infinite: told only
-  int met;       ///< off <= within
+  double off_alone;   ///< of the component of wanted and got: less than off where others of a vector are off
+  double within;      ///< tolerance: the term's, or for goals at one time a usual one; infinite: told only
+  int met;            ///< off <= within
   char unit[16], what[64]; ///< unit of its numbers; name of what is measured
 } cav_term_report;
 

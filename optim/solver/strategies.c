@@ -35,8 +35,8 @@ static const double swing_angle = 0.25, bend_angle = 0.4, pace = 1.2;
 /// Over obstacles limbs swing as much wider and slower.
 static const double wide = 1.6, leisure = 0.6;
 
-/// How much softer and how much slower than stated, how much longer a diagnosis may last, how many
-/// repairs there are at the end, and of what is nearly there by the stated guess and by another one.
+/// How much softer and how much slower than stated, how much longer a diagnosis may last, how much stronger its actuators
+/// are, how many repairs there are at the end, and of what is nearly there by the stated guess and by another one.
 enum {
   SOFTER = 2,
   CHEAPER = 10,
