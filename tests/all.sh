@@ -1,7 +1,8 @@
 #!/bin/sh
 # Every check of the project. Usage: sh tests/all.sh. Ends with one line, "N passed, N failed"; the exit status follows it.
 # Installs what is missing, then: both compilers with warnings as errors, the tests of each, the second build with address and
-# undefined-behaviour sanitizers and without those that solve whole motions (suite long); headers on their own as C and C++;
+# undefined-behaviour sanitizers (of debugging information the lines alone, which is what a finding names) and without those
+# that solve whole motions (suite long); headers on their own as C and C++;
 # layout of the text; installation and use through pkg-config, of the static and of the shared library.
 # CAVORT_BUILD names the folder of the builds, by default build-ci.
 set -u
@@ -149,7 +150,7 @@ example() { awk '/^```$/ { on = 0 } on { print } /^```c$/ { on = 1 }' README.md 
 if sh problems/install.sh test; then
   check "build, gcc" build gcc gcc --buildtype=release && tests gcc
   check "build, clang with sanitizers" build clang clang --buildtype=debugoptimized -Db_sanitize=address,undefined \
-    -Db_lundef=false &&
+    -Db_lundef=false -Dc_args=-g1 &&
     tests clang --timeout-multiplier 6 --no-suite long
   check "headers alone, C17 and C++17" headers
   if command -v clang-format >/dev/null 2>&1; then

@@ -356,7 +356,7 @@ int main(void) {
   model = scene_load(scene_joints);
   check_model("joints", STATES);
   model = cav_model_load(CAVORT_SOURCE_ROOT "/problems/models/humanoid.xml", NULL);
-  check_model("our humanoid", 8);
+  check_model("our humanoid", CHECK_CASES(8));
   model = scene_load(shapes);
   check_model("shapes", STATES);
   model = scene_load(lifted);
@@ -372,7 +372,7 @@ int main(void) {
     snprintf(path, sizeof path, "%s/%s.xml", folder, names[i]);
     model = cav_model_load(path, &error);
     // what does not load is for the tests of models to say
-    if (model) check_model(names[i], 8);
+    if (model) check_model(names[i], CHECK_CASES(8));
     if (!model) printf("%-28s left out: %s\n", names[i], error.text);
   }
   if (!folder) printf("shared models are absent: only scenes of our own\n");
