@@ -1,10 +1,12 @@
 /// What no actuator moves and is wanted elsewhere along the ground (solver/hand.c): where a ball has to be brought to push a
 /// block, against its closed form, and problems stated in a minute each, tests/pushing, whose stated guess ends at a
 /// motion that stands still, certified by the strategy that brings it there first: seven of a body that has to be pushed, two
-/// of a touch sensor that is to feel a force, which it has no derivative for until something touches.
+/// of a touch sensor that is to feel a force, which it has no derivative for until something touches. Where both hands of a
+/// humanoid come to a crate and a carton (solver/carry.c), and the carton lifted.
 #include <math.h>
 #include <string.h>
 
+#include "carry.h"
 #include "cavort/cavort.h"
 #include "check.h"
 #include "hand.h"
@@ -88,6 +90,7 @@ static void test_pushed(const char *name, const char *by, double most) {
   printf("%s: cost %.4f, %d iterations, %s%s\n", name, v.cost, s ? s->iterations : 0,
          v.certified ? "certified" : "not certified: ", v.reason);
   CHECK(v.certified && v.achieved && v.cost < most);
+  cav_strategies_clear(strategy, n);
   cav_solution_free(s);
   cav_problem_free(p);
 }
@@ -108,12 +111,48 @@ static void test_touched(void) {
   }
 }
 
+/// Both hands of a humanoid: at the back of a crate, a quarter of a metre deep with a friction of 0.8 on the floor, at nine
+/// tenths of the height from which it would tip, the right one to the right of the way; of a carton 28 cm wide at the middle
+/// of its sides. They lean on it by 0.3 of their thickness.
+static void test_both(void) {
+  for (int i = 0; i < 2; i++) {
+    cav_problem *p = load(i ? "carton" : "crate");
+    if (!p) continue;
+    cav_carry c, leans;
+    CHECK(cav_carry_find(p, 1, &c) == CAV_OK && c.found && c.lifts == i);
+    CHECK(cav_carry_find(p, 0.7, &leans) == CAV_OK && leans.found == c.found);
+    const int out = i; // the axis along which they press
+    for (int k = 0; k < 2; k++) {
+      const cav_geom *geom = &p->model->geom[c.term[k].sensor.object];
+      const double side = i && k ? 1 : -1, face = i ? 0.14 : 0.25;
+      CHECK(strstr(p->model->body[geom->body].name, k ? "left" : "right") != NULL);
+      const double thick = side * c.place[k][out] - face;
+      CHECK(thick > 0 && thick <= geom->bound);
+      CHECK_NEAR(side * leans.place[k][out] - face, 0.7 * thick, 1e-9);
+      CHECK_NEAR(c.place[k][2], i ? 0 : 0.001 + 0.9 * 0.25 / 0.8 - 0.451, 1e-9);
+      if (i) CHECK_NEAR(c.place[k][0], 0, 1e-9);
+      if (!i) CHECK((k ? 1 : -1) * c.place[k][1] > 0.1 && fabs(c.place[k][1]) <= 0.3);
+      CHECK(c.term[k].from > 0 && c.term[k].from < c.term[k].to && c.term[k].to == p->duration);
+    }
+    // the body follows the crate by what arms do not reach; the carton stays in reach
+    CHECK(i ? c.go[0] == 0 : c.go[0] > 0.1 && c.go[0] <= 0.3);
+    CHECK_NEAR(c.go[1], 0, 1e-12);
+    cav_problem_free(p);
+  }
+}
+
 /// Nothing to push: a hopper alone.
 static void test_none(void) {
   cav_error error = {0};
   cav_hand hand;
   cav_problem *p = cav_problem_load(CAVORT_SOURCE_ROOT "/problems/motions/hop/problem.xml", NULL, &error);
   if (CHECK(p != NULL)) CHECK(cav_hand_find(p, 1, &hand) == CAV_OK && !hand.found);
+  cav_carry carry;
+  if (p) CHECK(cav_carry_find(p, 1, &carry) == CAV_OK && !carry.found);
+  cav_problem_free(p);
+  // one hand on a base that stands: no second one
+  p = load("ahead");
+  if (p) CHECK(cav_carry_find(p, 1, &carry) == CAV_OK && !carry.found);
   cav_problem_free(p);
 }
 
@@ -121,6 +160,7 @@ int main(void) {
   test_place();
   test_components();
   test_touched();
+  test_both();
   test_none();
   static const struct {
     const char *name;
@@ -129,5 +169,7 @@ int main(void) {
                  {"slid", 0.12},  {"straight", 0.3}, {"aside", 0.3}};
   for (size_t i = 0; i < sizeof problem / sizeof *problem; i++) test_pushed(problem[i].name, "push", problem[i].most);
   test_pushed("press", "touch", 0.2), test_pushed("feel", "touch", 0.2), test_pushed("bear", "touch", 0.2);
+  // a file without a guess is begun so
+  test_pushed("carton", "stated", 1);
   return check_result();
 }

@@ -353,16 +353,16 @@ typedef struct cav_strategy {
   int nswing;                           ///< sines over joints of the guess
   cav_swing swing[CAV_STRATEGY_SWINGS]; ///< [nswing]
   int ground;                           ///< 1: its guess stands on what is below it
-  int hand;                             ///< 1: a hand is brought first to what has to be pushed or touched
-  double height, from, to;              ///< not stated: of a ballistic arc, m, and when, s
-  int flies;                            ///< 1: start and goal are held before and after that arc
-  cav_guess_pose pose[2];               ///< where it flies
-  cav_schedule schedule;                ///< schedule that it takes
-  double effort_limit, timestep;        ///< those of the problem where 0
-  double strength;                      ///< a diagnosis: cav_problem.strength
-  int open;       ///< 1: a diagnosis that need not end at rest; 0 without strength: may last longer
-  int nterm;      ///< number of the changed terms
-  cav_term *term; ///< [nterm] in the place of the problem's, whose names and targets they borrow; NULL
+  int hand;                      ///< hands that are brought first to what has to be pushed, carried or touched: 1 or 2
+  double height, from, to;       ///< not stated: of a ballistic arc, m, and when, s
+  int flies;                     ///< 1: start and goal are held before and after that arc
+  cav_guess_pose pose[2];        ///< where it flies
+  cav_schedule schedule;         ///< schedule that it takes
+  double effort_limit, timestep; ///< those of the problem where 0
+  double strength;               ///< a diagnosis: cav_problem.strength
+  int open;                      ///< 1: a diagnosis that need not end at rest; 0 without strength: may last longer
+  int nterm;                     ///< number of the changed terms
+  cav_term *term;                ///< [nterm] in the place of the problem's, whose names and targets they borrow; NULL
   char changed[CAV_STRATEGY_CHANGES]; ///< what a repair changes in the problem, in words
 } cav_strategy;
 

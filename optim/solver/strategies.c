@@ -7,6 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "carry.h"
 #include "clear.h"
 #include "continuation.h"
 #include "detour.h"
@@ -160,6 +161,7 @@ typedef struct guesses {
   cav_strategy detour;                   ///< round what the straight way runs into; none without swings
   int collides, decorated, sinks;        ///< what the stated guess does, and is
   int pivots;                            ///< 1: it turns four feet or more on the spot, where they stand
+  int led;                               ///< 1: a file without a guess is begun with both hands led
 } guesses;
 
 /// With what no actuator moves kept upright. What tips is not mended by what else is missed, so this comes first where terms
@@ -257,18 +259,31 @@ static cav_status add_pumped(const cav_problem *problem, cav_strategy *strategy,
   return status;
 }
 
-/// With a hand brought first to what has to be pushed or touched.
-static cav_status add_pushed(const cav_problem *problem, cav_strategy *strategy, int *n, const cav_strategy *stated) {
-  cav_hand hand;
-  cav_strategy push = *stated;
-  push.hand = 1;
-  cav_status status = problem->cycle.on ? CAV_OK : cav_hand_find(problem, 1, &hand);
-  if (problem->cycle.on || status || !hand.found) return status;
+/// With hands brought first to what has to be pushed, carried or touched: both of what stands on a free base, or else one.
+/// A file without a guess whose terms bring no hands there is begun so.
+static cav_status add_pushed(const cav_problem *problem, cav_strategy *strategy, int *n, guesses *g) {
+  cav_hand hand = {.found = 0};
+  cav_carry carry;
+  cav_strategy push = g->stated;
+  if (problem->cycle.on) return CAV_OK;
+  cav_status status = cav_carry_find(problem, 1, &carry);
+  if (!status && !carry.found) status = cav_hand_find(problem, 1, &hand);
+  if (status || (!carry.found && !hand.found)) return status;
+  push.hand = carry.found ? 2 : 1;
   push.text =
-      hand.touches
+      carry.found
+          ? carry.lifts
+                ? "with both hands brought first to the sides of what has to be lifted, the body going along"
+                : "with both hands brought first to the side that what has to move is pushed from, the body going along"
+      : hand.touches
           ? "with what is to touch brought there first, contacts sharp from there on"
           : "with a hand brought first to the side that what has to move is pushed from, contacts sharp from there on";
-  add_mended(strategy, n, &push, hand.touches ? "touch" : "push");
+  g->led = carry.found && !g->decorated && !g->collides && problem->guess == CAV_GUESS_INTERPOLATE &&
+           !cav_upright_held(problem);
+  if (g->led)
+    begin_with(strategy, &push);
+  else
+    add_mended(strategy, n, &push, carry.found && carry.lifts ? "carry" : hand.touches ? "touch" : "push");
   return status;
 }
 
@@ -313,7 +328,7 @@ static cav_status find_guesses(const cav_problem *problem, const cav_strategy *s
 static void add_plain(const cav_problem *problem, cav_strategy *strategy, int *n, const guesses *g) {
   // where the goal is the start, the way straight to it is the start held
   const int stays = !problem->cycle.on && is_back(problem), holds = problem->guess == CAV_GUESS_HOLD;
-  if ((g->decorated || holds || g->sinks || g->pivots) && !stays)
+  if ((g->decorated || holds || g->sinks || g->pivots || g->led) && (!stays || g->led))
     add(strategy, n, &g->plain, "line", "straight from start to goal");
   cav_strategy still = g->plain;
   still.guess = CAV_GUESS_HOLD;
@@ -386,11 +401,11 @@ cav_status cav_strategy_list(const cav_problem *problem, cav_strategy strategy[C
   guesses g;
   int swings_up;
   cav_status status = add_stated(problem, strategy, n, &stated);
-  if (status == CAV_OK) status = add_pushed(problem, strategy, n, &stated);
+  if (status == CAV_OK) status = find_guesses(problem, &stated, strategy, &g);
+  if (status == CAV_OK) status = add_pushed(problem, strategy, n, &g);
   if (status == CAV_OK && !cav_upright_held(problem)) status = add_upright(problem, strategy, n, &stated);
   if (status == CAV_OK) status = add_posture(problem, strategy, n, &stated);
   if (status == CAV_OK) status = add_pumped(problem, strategy, n, &swings_up);
-  if (status == CAV_OK) status = find_guesses(problem, &stated, strategy, &g);
   if (status == CAV_OK) status = add_others(problem, strategy, n, &g);
   if (status != CAV_OK) return status;
   begin_upright(strategy, *n);
@@ -436,35 +451,83 @@ static cav_schedule resumed(const cav_schedule *schedule) {
   return rest;
 }
 
-/// To where a hand leads a guess; its terms are no part of the problem.
-static cav_status lead(const cav_problem *problem, double away, const cav_solve_options *options,
-                       const cav_solution *before, cav_solution **solution, cav_error *error) {
+/// What leads a guess: terms that are no part of the problem, and what the guess passes.
+typedef struct leading {
   cav_hand hand;
+  cav_carry carry;
+  cav_guess_pose pose[2];
+  cav_strategy gait;
+  cav_term *term;
+  double *q;
+} leading;
+
+static void add_terms(const cav_problem *problem, const cav_term *more, int n, leading *l, cav_problem *led) {
+  memcpy(l->term, problem->term, (size_t)problem->nterm * sizeof *l->term);
+  memcpy(l->term + problem->nterm, more, (size_t)n * sizeof *more);
+  led->term = l->term, led->nterm = problem->nterm + n;
+}
+
+/// By both hands: the base goes along, by a gait where it goes far. A guess of the problem's own passes what it states.
+static cav_status lead_both(const cav_problem *problem, double away, leading *l, cav_problem *led) {
+  cav_status status = cav_carry_find(problem, away, &l->carry);
+  if (status) return status;
+  add_terms(problem, l->carry.term, l->carry.found, l, led);
+  led->schedule.kinematics = !l->carry.lifts;
+  led->schedule.optimality = 0.05;
+  if (is_decorated(problem) || !l->carry.found) return CAV_OK;
+  cav_carry_poses(problem, &l->carry, l->q, l->pose);
+  cav_problem moved = *problem;
+  int turns;
+  moved.q_goal = l->q + problem->model->nq;
+  status = cav_gait_find(&moved, &l->gait, &turns);
+  led->guess = CAV_GUESS_INTERPOLATE;
+  led->guess_pose = l->pose, led->nguess_pose = 2;
+  if (!turns) led->swing = l->gait.swing, led->nswing = l->gait.nswing;
+  return status;
+}
+
+static cav_status lead_one(const cav_problem *problem, double away, leading *l, cav_problem *led) {
+  cav_status status = cav_hand_find(problem, away, &l->hand);
+  if (status) return status;
+  add_terms(problem, l->hand.term, l->hand.found, l, led);
+  led->schedule = cav_hand_schedule(&problem->schedule);
+  return CAV_OK;
+}
+
+/// To where hands lead a guess.
+static cav_status lead(const cav_problem *problem, int hands, double away, const cav_solve_options *options,
+                       const cav_solution *before, cav_solution **solution, cav_error *error) {
   cav_problem led = *problem;
   cav_solve_options first = *options;
-  cav_term *term = calloc((size_t)problem->nterm + CAV_HAND_TERMS, sizeof *term);
-  cav_status status = term ? cav_hand_find(problem, away, &hand) : CAV_NO_MEMORY;
+  leading l = {.term = calloc((size_t)problem->nterm + CAV_CARRY_TERMS, sizeof *l.term)};
+  l.q = malloc(2 * (size_t)problem->model->nq * sizeof *l.q);
+  cav_status status = !l.term || !l.q ? CAV_NO_MEMORY
+                      : hands == 2    ? lead_both(problem, away, &l, &led)
+                                      : lead_one(problem, away, &l, &led);
   *solution = NULL;
   if (!status) {
-    memcpy(term, problem->term, (size_t)problem->nterm * sizeof *term);
-    memcpy(term + problem->nterm, hand.term, sizeof hand.term);
-    led.term = term, led.nterm = problem->nterm + hand.found;
-    led.schedule = cav_hand_schedule(&problem->schedule);
     first.diagnose = first.gains = 0;
     status = cav_solve_after(&led, &first, NULL, before, solution, error);
   }
-  free(term);
+  free(l.term);
+  free(l.q);
   return status;
 }
 
 /// Unactuated force, fraction of the weight, beyond which a motion that pushes is given up.
 static const double far_off = 5e-3;
 
+/// Whether a motion that a solve did not bring to its tolerance has what a certificate asks of rows, and gains: those of what
+/// comes to rest come in slowly.
+static int is_settled(const cav_solution *solution) {
+  return solution->unactuated <= CAV_TOLERANCE_UNACTUATED && solution->gain_q;
+}
+
 /// By a hand first, that touches what it pushes or leans on it, and from there to the end of a solve; where rows do not come
 /// in, by the last stage before it. The first way whose rows do. A checkpoint of it is not gone on from: it begins anew, and
 /// ends with the same bits.
-static cav_status solve_pushed(const cav_problem *taken, const cav_solve_options *options, cav_solution **solution,
-                               cav_error *error) {
+static cav_status solve_pushed(const cav_problem *taken, int hands, const cav_solve_options *options,
+                               cav_solution **solution, cav_error *error) {
   static const double away[] = {1, 0.7};
   enum { WAYS = sizeof away / sizeof *away, ENDS = 2 };
   cav_problem last = *taken;
@@ -477,7 +540,7 @@ static cav_status solve_pushed(const cav_problem *taken, const cav_solve_options
   rest.diagnose = 0; // what is least violated stands still
   for (int i = 0; i < WAYS && status == CAV_NOT_CONVERGED; i++) {
     rest.first_stage = 0;
-    status = lead(taken, away[i], &rest, before, solution, error);
+    status = lead(taken, hands, away[i], &rest, before, solution, error);
     cav_trajectory *start = *solution ? cav_trajectory_copy((*solution)->trajectory) : NULL;
     if (*solution && !start) status = CAV_NO_MEMORY;
     // one that was stopped, or has no motion, ends here
@@ -487,6 +550,7 @@ static cav_status solve_pushed(const cav_problem *taken, const cav_solve_options
       before = *solution;
       rest.first_stage = last.schedule.stages + 1 - k;
       status = cav_solve_after(&last, &rest, start, before, solution, error);
+      if (status == CAV_NOT_CONVERGED && *solution && is_settled(*solution)) status = CAV_OK;
       ends = status == CAV_NOT_CONVERGED && *solution;
     }
     cav_solution_free(before);
@@ -515,7 +579,7 @@ cav_status cav_strategy_solve(const cav_problem *problem, const cav_strategy *st
                               cav_error *error) {
   cav_problem taken;
   cav_strategy_apply(problem, strategy, &taken);
-  if (strategy->hand && !start) return solve_pushed(&taken, options, solution, error);
+  if (strategy->hand && !start) return solve_pushed(&taken, strategy->hand, options, solution, error);
   const cav_checkpoint *resume = options ? options->resume : NULL;
   int second = resume && resume->order == strategy->order;
   if (!strategy->first_midpoint || start || second) {

@@ -1,0 +1,275 @@
+/// Both hands to a free body that is asked for elsewhere. Where what has hands stands on a free base, one hand alone turns or
+/// tips what is heavy, and a guess in which the base stays where it is pushes as far as arms reach. So both are led: to the
+/// side that it is pushed from, as low as it does not tip, or where it is to be lifted to its two sides; the base goes along.
+/// Terms of a cost lead, and are no part of the problem.
+#include "carry.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "math3.h"
+#include "quantity.h"
+#include "role.h"
+#include "thing.h"
+#include "transcription.h"
+
+/// Of the time until the body is asked for last: from when on hands are there, at the latest of that until it is first asked
+/// for elsewhere, and until when, where they are wanted elsewhere at the end.
+static const double begins = 0.3, before_first = 0.6, leaves = 0.7;
+
+/// Of the height at which a body would tip over its edge; of its half width, and of the reach of an arm, how far hands are.
+static const double steady = 0.9, within_width = 0.7, reached = 0.9;
+
+/// Speed at which the base comes to it, m/s, and the way from which it has to, m.
+static const double pace = 0.8, least_step = 0.05;
+
+/// What is known of the hands while places are found.
+typedef struct hands {
+  const cav_model *m;
+  const cav_state *state; ///< at the start
+  const cav_problem *problem;
+  cav_thing thing;
+  int geom[2];      ///< of the right and the left hand
+  double at[2][3];  ///< m, where they are
+  double reach;     ///< m, of an arm
+  double toward[2]; ///< unit, along the ground, from the root to the body
+  double friction;  ///< of the body on the ground
+  const double *root;
+} hands;
+
+/// The geom of a hand that can touch the link; -1: none.
+static int geom_of(const cav_model *m, const cav_roles *roles, cav_role role, int link) {
+  const int body = roles->body[role], meant = roles->geom[role];
+  int best = -1;
+  for (int i = 0; i < m->npair && body > 0; i++) {
+    const int one = m->pair[i].geom1, two = m->pair[i].geom2;
+    const int geom = m->geom[one].link == link ? two : m->geom[two].link == link ? one : -1;
+    if (geom < 0 || (m->geom[geom].body != body && geom != meant)) continue;
+    if (best < 0 || geom == meant) best = geom;
+  }
+  return best;
+}
+
+/// The joint of a link that is free in the world; -1: it is not.
+static int free_joint(const cav_model *m, int link) {
+  const cav_link *root = &m->link[m->link[link].root];
+  return root->njoint == 1 && m->joint[root->joint].type == CAV_JOINT_FREE ? root->joint : -1;
+}
+
+/// Sliding friction of the body against the world.
+static double ground_friction(const cav_model *m, int link) {
+  double least = INFINITY;
+  for (int i = 0; i < m->npair; i++) {
+    const cav_pair *pair = &m->pair[i];
+    const int one = m->geom[pair->geom1].link, two = m->geom[pair->geom2].link;
+    if ((one == link && two == 0) || (two == link && one == 0)) least = fmin(least, pair->friction[0]);
+  }
+  return isfinite(least) ? least : 1;
+}
+
+static int is_still(const cav_problem *p, int joint) {
+  const double *v = p->v_start + p->model->joint[joint].dof;
+  for (int k = 0; k < 6; k++)
+    if (v[k] != 0) return 0;
+  return 1;
+}
+
+/// Whether terms say where the root is at the end, or the goal has it elsewhere.
+static int is_root_bound(const cav_problem *p, int root) {
+  const double *a = p->q_start + p->model->joint[root].q, *b = p->q_goal + p->model->joint[root].q;
+  int bound = hypot(b[0] - a[0], b[1] - a[1]) >= CAV_THING_WAY;
+  for (int i = 0; i < p->nterm && !bound; i++) {
+    const cav_term *term = &p->term[i];
+    const int last = term->to < 0 || term->to >= p->duration;
+    bound = term->quantity == CAV_QUANTITY_CONFIGURATION && last && term->from > 0 && cav_term_asks(term) &&
+            (term->dofs == CAV_DOFS_ALL || term->dofs == CAV_DOFS_ROOT_LINEAR);
+  }
+  return bound;
+}
+
+/// Whether terms ask for a posture of the joints at the end.
+static int is_posture_bound(const cav_problem *p) {
+  int bound = 0;
+  for (int i = 0; i < p->nterm && !bound; i++) {
+    const cav_term *term = &p->term[i];
+    const int last = term->to < 0 || term->to >= p->duration;
+    bound = term->quantity == CAV_QUANTITY_CONFIGURATION && last && term->from > 0 && cav_term_asks(term) &&
+            (term->dofs == CAV_DOFS_ALL || term->dofs == CAV_DOFS_JOINTS);
+  }
+  return bound;
+}
+
+/// Finds hands, arms and the way to the body; 0: there are none, or they cannot touch it.
+static int find_hands(hands *h, const cav_roles *roles, int root) {
+  const cav_model *m = h->m;
+  const double *start = h->problem->q_start + m->joint[root].q;
+  double body[3];
+  for (int k = 0; k < 2; k++) {
+    const cav_role role = k ? CAV_ROLE_LEFT_HAND : CAV_ROLE_RIGHT_HAND;
+    cav_pose pose;
+    h->geom[k] = geom_of(m, roles, role, h->thing.link);
+    if (h->geom[k] < 0 || roles->limb[role] < 0) return 0;
+    cav_object_pose(m, h->state, CAV_OBJECT_GEOM, h->geom[k], &pose);
+    copy3(h->at[k], pose.pos);
+    cav_object_pose(m, h->state, CAV_OBJECT_XBODY, roles->limb[role], &pose);
+    double arm[3];
+    sub3(arm, h->at[k], pose.pos);
+    h->reach = fmax(h->reach, norm3(arm));
+  }
+  transform(body, h->state->link[h->thing.link].pos, h->state->link[h->thing.link].rotation,
+            m->link[h->thing.link].com);
+  const double x = body[0] - start[0], y = body[1] - start[1], far = hypot(x, y);
+  h->root = start;
+  h->toward[0] = far > 0 ? x / far : 1, h->toward[1] = far > 0 ? y / far : 0;
+  h->friction = ground_friction(m, h->thing.link);
+  return 1;
+}
+
+/// The horizontal axis of the body that is nearest to a horizontal direction, along it.
+static void nearest_axis(const cav_pose *body, const double along[2], double axis[3]) {
+  double most = 0;
+  set3(axis, along[0], along[1], 0);
+  for (int k = 0; k < 3; k++) {
+    double one[3];
+    column3(one, body->rotation, k);
+    const double c = one[0] * along[0] + one[1] * along[1];
+    if (fabs(c) <= most || fabs(one[2]) > 0.3) continue;
+    most = fabs(c);
+    set3(axis, copysign(1, c) * one[0], copysign(1, c) * one[1], 0);
+  }
+  normalise3(axis);
+}
+
+/// Where the hands hold the body, in the world: at its two sides as seen from the root.
+static void find_sides(const hands *h, const cav_pose *body, double away, double place[2][3]) {
+  const double left[2] = {-h->toward[1], h->toward[0]};
+  for (int k = 0; k < 2; k++) {
+    const double along[2] = {k ? left[0] : -left[0], k ? left[1] : -left[1]};
+    double n[3], back[3], centre[3], lowest;
+    cav_pose hand;
+    nearest_axis(body, along, n);
+    scale3(back, -1, n);
+    cav_object_pose(h->m, h->state, CAV_OBJECT_GEOM, h->geom[k], &hand);
+    const double out = cav_thing_surface(h->m, h->state, h->thing.link, n, centre, &lowest);
+    axpy3(place[k], centre, out + away * cav_geom_reach(&h->m->geom[h->geom[k]], &hand, back), n);
+  }
+}
+
+/// Where they push it from, in the world: opposite to the way, side by side, where it does not tip.
+static void find_back(const hands *h, double away, double place[2][3]) {
+  static const double up[3] = {0, 0, 1};
+  double n[3] = {-h->thing.way[0], -h->thing.way[1], 0}, across[3], centre[3], lowest, none;
+  normalise3(n);
+  set3(across, -n[1], n[0], 0); // to the left of what comes along the way is the right of -n: see the sign below
+  const double depth = cav_thing_surface(h->m, h->state, h->thing.link, n, centre, &lowest);
+  const double width = cav_thing_surface(h->m, h->state, h->thing.link, across, centre, &none);
+  const double top = centre[2] + cav_thing_surface(h->m, h->state, h->thing.link, up, centre, &none);
+  double side[3];
+  sub3(side, h->at[1], h->at[0]);
+  const double apart = fmin(within_width * width, 0.5 * hypot(side[0], side[1]));
+  for (int k = 0; k < 2; k++) {
+    const cav_geom *geom = &h->m->geom[h->geom[k]];
+    cav_pose hand;
+    cav_object_pose(h->m, h->state, CAV_OBJECT_GEOM, h->geom[k], &hand);
+    axpy3(place[k], centre, depth + away * cav_geom_reach(geom, &hand, n), n);
+    axpy3(place[k], place[k], k ? -apart : apart, across);
+    const double thick = cav_geom_reach(geom, &hand, up), tips = lowest + steady * depth / h->friction;
+    place[k][2] = fmax(fmin(fmin(h->at[k][2], tips), top - thick), lowest + thick);
+  }
+}
+
+static void find_times(const cav_problem *p, const hands *h, double come, cav_carry *c) {
+  const double end = h->thing.time;
+  c->from = fmin(fmax(begins * end, come / pace), before_first * fmin(end, fmax(h->thing.first, begins * end)));
+  const int held = c->lifts && h->thing.way[2] >= CAV_THING_WAY;
+  c->to = !held && is_posture_bound(p) ? fmax(leaves * end, c->from + p->timestep) : end;
+}
+
+static void lay(const hands *h, const cav_pose *body, double place[2][3], cav_carry *c) {
+  const cav_model *m = h->m;
+  const int index = m->link[h->thing.link].body;
+  for (int k = 0; k < 2; k++) {
+    double d[3];
+    sub3(d, place[k], body->pos);
+    rotate_back(c->place[k], body->rotation, d);
+    c->term[k] = cav_leading_term(CAV_SENSOR_FRAMEPOS, CAV_OBJECT_GEOM, h->geom[k], c->place[k]);
+    c->term[k].sensor.referred = 1, c->term[k].sensor.reference_type = CAV_OBJECT_XBODY;
+    c->term[k].sensor.reference = index;
+    c->term[k].from = c->from, c->term[k].to = c->to;
+  }
+  column3(c->upright, body->rotation, 2);
+  copy3(c->still, body->pos);
+  add3(c->there, body->pos, h->thing.way);
+  c->term[2] = cav_leading_term(CAV_SENSOR_FRAMEZAXIS, CAV_OBJECT_XBODY, index, c->upright);
+  c->term[2].to = h->thing.time;
+  c->term[3] = cav_leading_term(CAV_SENSOR_FRAMEPOS, CAV_OBJECT_XBODY, index, c->still);
+  c->term[3].to = c->from;
+  c->term[4] = cav_leading_term(CAV_SENSOR_FRAMEPOS, CAV_OBJECT_XBODY, index, c->there);
+  c->term[4].from = c->to, c->term[4].to = h->thing.time;
+  c->found = c->to < h->thing.time ? CAV_CARRY_TERMS : CAV_CARRY_TERMS - 1;
+  for (int k = 0; k < 2; k++)
+    if (!isfinite(norm3(c->place[k]))) c->found = 0;
+}
+
+/// How far the root has to go for a place to be in reach, m: the way there, which it goes.
+static double step_to(const hands *h, double at[2], const double place[3], double way[2]) {
+  const double d[2] = {place[0] - at[0], place[1] - at[1]}, far = hypot(d[0], d[1]), step = far - reached * h->reach;
+  const double goes = step > least_step ? step : 0;
+  for (int k = 0; k < 2; k++) way[k] = far > 0 ? goes * d[k] / far : 0, at[k] += way[k];
+  return goes;
+}
+
+static void find_carry(hands *h, double away, cav_carry *c) {
+  const cav_model *m = h->m;
+  double place[2][3], middle[3];
+  cav_pose body;
+  cav_object_pose(m, h->state, CAV_OBJECT_XBODY, m->link[h->thing.link].body, &body);
+  if (c->lifts)
+    find_sides(h, &body, away, place);
+  else
+    find_back(h, away, place);
+  add3(middle, place[0], place[1]);
+  scale3(middle, 0.5, middle);
+  double at[2] = {h->root[0], h->root[1]};
+  const double come = step_to(h, at, middle, c->come);
+  add3(middle, middle, h->thing.way);
+  step_to(h, at, middle, c->go);
+  const double *goal = h->problem->q_goal + m->joint[c->root].q;
+  for (int k = 0; k < 2 && is_root_bound(h->problem, c->root); k++) c->go[k] = goal[k] - h->root[k] - c->come[k];
+  find_times(h->problem, h, come, c);
+  lay(h, &body, place, c);
+}
+
+cav_status cav_carry_find(const cav_problem *problem, double away, cav_carry *carry) {
+  const cav_model *m = problem->model;
+  *carry = (cav_carry){.found = 0};
+  if (problem->cycle.on) return CAV_OK;
+  hands h = {.m = m, .problem = problem};
+  cav_roles roles;
+  cav_state *state = cav_state_new(m);
+  cav_status status = state ? cav_thing_find(problem, 1, state, &h.thing) : CAV_NO_MEMORY;
+  if (!status) status = cav_roles_find(m, state, &roles);
+  if (!status) status = cav_position(m, state, problem->q_start);
+  if (!status && h.thing.link && roles.body[CAV_ROLE_RIGHT_HAND] > 0 && roles.body[CAV_ROLE_LEFT_HAND] > 0) {
+    h.state = state;
+    carry->lifts = h.thing.rise >= CAV_THING_WAY;
+    carry->thing = free_joint(m, h.thing.link);
+    carry->root = free_joint(m, m->body[roles.body[CAV_ROLE_RIGHT_HAND]].link);
+    const int usable = carry->thing >= 0 && carry->root >= 0 && is_still(problem, carry->thing);
+    if (usable && find_hands(&h, &roles, carry->root)) find_carry(&h, away, carry);
+  }
+  cav_state_free(state);
+  return status;
+}
+
+void cav_carry_poses(const cav_problem *problem, const cav_carry *carry, double *q, cav_guess_pose pose[2]) {
+  const cav_model *m = problem->model;
+  const int root = m->joint[carry->root].q, thing = m->joint[carry->thing].q;
+  for (int i = 0; i < 2; i++) {
+    double *at = q + (size_t)i * (size_t)m->nq;
+    memcpy(at, problem->q_start, (size_t)m->nq * sizeof *at);
+    for (int k = 0; k < 2; k++) at[root + k] += carry->come[k] + (i ? carry->go[k] : 0);
+    if (i) copy3(at + thing, carry->there);
+    pose[i] = (cav_guess_pose){i ? carry->to : carry->from, at};
+  }
+}

@@ -1,0 +1,134 @@
+/// What no actuator moves and terms or the goal ask for elsewhere: which, how far and when, and its surface. hand.c and carry.c
+/// bring hands to it.
+#include "thing.h"
+
+#include <math.h>
+
+#include "math3.h"
+#include "quantity.h"
+#include "role.h"
+#include "transcription.h"
+
+/// Weight of the terms that lead.
+static const double weight = 300;
+
+/// Whether no actuator moves a link that can move.
+static int is_left(const cav_model *m, int link) { return link > 0 && !m->link[link].driven; }
+
+/// Along the ground, and far enough; or up, where what is lifted counts.
+static int is_moved(const cav_thing *t, int lifted) {
+  const double along = hypot(t->way[0], t->way[1]);
+  return (along >= CAV_THING_WAY && along >= fabs(t->way[2])) || (lifted && t->rise >= CAV_THING_WAY);
+}
+
+/// Adds what a term asks for of a link's place. The state is at the start.
+static void add_term(const cav_problem *p, const cav_term *term, cav_state *state, cav_thing *found) {
+  const cav_sensor *s = &term->sensor;
+  const int z = term->component < 0 || term->component == 2;
+  double at[CAV_SENSOR_DIM_MAX], target[CAV_SENSOR_DIM_MAX];
+  if (!cav_term_places(p->model, term, found->link) || !cav_term_asks(term)) return;
+  const double to = term->to < 0 ? p->duration : fmin(term->to, p->duration);
+  cav_sensor_read(p->model, state, s, at);
+  if (term->use == CAV_USE_RANGE) {
+    if (term->component == 2 && isfinite(term->lower)) found->rise = fmax(found->rise, term->lower - at[2]);
+    return;
+  }
+  // over a window that is where it is on the way, and the last one is where it goes
+  for (int end = 0; end < 2; end++) {
+    double far = 0;
+    const double time = end ? to : fmin(fmax(term->from, 0), to);
+    cav_term_target(term, time, s->dim, target);
+    for (int k = 0; k < 3; k++)
+      if (term->component < 0 || term->component == k) far = fmax(far, fabs(target[k] - at[k]));
+    if (far >= CAV_THING_WAY) found->first = fmin(found->first, time);
+    if (z) found->rise = fmax(found->rise, target[2] - at[2]);
+  }
+  if (to < found->time) return;
+  for (int k = 0; k < 3; k++)
+    if (term->component < 0 || term->component == k) found->way[k] = target[k] - at[k];
+  found->time = to;
+}
+
+/// The first link that terms ask for elsewhere; link 0: none.
+static void find_of_terms(const cav_problem *p, int lifted, cav_state *state, cav_thing *found) {
+  for (int l = 1; l < p->model->nlink && !found->link; l++) {
+    if (!is_left(p->model, l)) continue;
+    cav_thing one = {.link = l, .first = p->duration};
+    for (int i = 0; i < p->nterm; i++) add_term(p, &p->term[i], state, &one);
+    if (is_moved(&one, lifted)) *found = one;
+  }
+}
+
+/// What the goal has elsewhere than the start, if no term asks for anything. The state is at the start, and comes to the goal.
+static cav_status find_of_goal(const cav_problem *p, int lifted, cav_state *state, cav_thing *found) {
+  const cav_model *m = p->model;
+  if (p->cycle.on) return CAV_OK;
+  for (int l = 1; l < m->nlink && !found->link; l++) {
+    if (!is_left(m, l) || m->link[l].root != l) continue;
+    cav_thing one = {.link = l, .first = p->duration, .time = p->duration};
+    cav_status status = cav_position(m, state, p->q_start);
+    if (status) return status;
+    scale3(one.way, -1, state->link[l].pos);
+    if ((status = cav_position(m, state, p->q_goal))) return status;
+    add3(one.way, one.way, state->link[l].pos);
+    one.rise = one.way[2];
+    if (is_moved(&one, lifted)) *found = one;
+  }
+  return CAV_OK;
+}
+
+cav_status cav_thing_find(const cav_problem *problem, int lifted, cav_state *state, cav_thing *thing) {
+  *thing = (cav_thing){.link = 0};
+  cav_status status = cav_position(problem->model, state, problem->q_start);
+  if (!status) find_of_terms(problem, lifted, state, thing);
+  return status || thing->link ? status : find_of_goal(problem, lifted, state, thing);
+}
+
+double cav_geom_exit(const cav_geom *geom, const cav_pose *pose, const double n[3]) {
+  double d[3], least = INFINITY;
+  const double *s = geom->size;
+  rotate_back(d, pose->rotation, n);
+  const double across = hypot(d[0], d[1]);
+  switch (geom->type) {
+    case CAV_GEOM_SPHERE:
+      return s[0];
+    case CAV_GEOM_ELLIPSOID:
+      return 1 / sqrt(pow(d[0] / s[0], 2) + pow(d[1] / s[1], 2) + pow(d[2] / s[2], 2));
+    case CAV_GEOM_CAPSULE:
+    case CAV_GEOM_CYLINDER:
+      if (across > 0) least = s[0] / across;
+      return fabs(d[2]) > 0 ? fmin(least, (s[1] + (geom->type == CAV_GEOM_CAPSULE ? s[0] : 0)) / fabs(d[2])) : least;
+    case CAV_GEOM_BOX:
+    case CAV_GEOM_MESH: // its box
+      for (int k = 0; k < 3; k++)
+        if (d[k] != 0) least = fmin(least, s[k] / fabs(d[k]));
+      return least;
+    default:
+      return 0;
+  }
+}
+
+double cav_thing_surface(const cav_model *m, const cav_state *state, int link, const double n[3], double centre[3],
+                         double *lowest) {
+  static const double down[3] = {0, 0, 1};
+  double out = 0;
+  transform(centre, state->link[link].pos, state->link[link].rotation, m->link[link].com);
+  *lowest = INFINITY;
+  for (int g = 0; g < m->ngeom; g++) {
+    if (m->geom[g].link != link || !(m->geom[g].contype || m->geom[g].conaffinity)) continue;
+    cav_pose pose;
+    double arm[3];
+    cav_object_pose(m, state, CAV_OBJECT_GEOM, g, &pose);
+    sub3(arm, pose.pos, centre);
+    out = fmax(out, dot3(arm, n) + cav_geom_exit(&m->geom[g], &pose, n));
+    *lowest = fmin(*lowest, pose.pos[2] - cav_geom_reach(&m->geom[g], &pose, down));
+  }
+  return out;
+}
+
+cav_term cav_leading_term(cav_sensor_type type, cav_object_type object_type, int object, const double *target) {
+  cav_term term = {.name = "hand", .quantity = CAV_QUANTITY_SENSOR, .use = CAV_USE_COST, .target = target};
+  term.sensor = (cav_sensor){.name = "", .type = type, .dim = 3, .object_type = object_type, .object = object};
+  term.component = -1, term.scale = 1, term.weight = weight, term.within = INFINITY;
+  return term;
+}

@@ -1,0 +1,32 @@
+/// What no actuator moves and is asked for elsewhere, and what it takes to bring a hand to it. Private to optim/solver.
+#ifndef CAVORT_THING_H
+#define CAVORT_THING_H
+
+#include "cavort/problem.h"
+
+typedef struct cav_thing {
+  int link;      ///< 0: there is none
+  double way[3]; ///< m, from where it is at the start to where it is asked for last
+  double first;  ///< s, when it is first asked for elsewhere
+  double time;   ///< s, when it is asked for last
+  double rise;   ///< m, how far over where it is at the start it is asked for at any time
+} cav_thing;
+
+/// m: a way from which a thing has to be moved.
+#define CAV_THING_WAY 0.02
+
+/// The first link that terms ask for elsewhere, or else the goal: along the ground, with lifted also up. CAV_NO_MEMORY, or what
+/// the dynamics says of start and goal; the state is at one of them after that.
+cav_status cav_thing_find(const cav_problem *problem, int lifted, cav_state *state, cav_thing *thing);
+
+/// The centre of a link's mass, how far its surface is from there along the unit direction n, and how low it comes.
+double cav_thing_surface(const cav_model *model, const cav_state *state, int link, const double n[3], double centre[3],
+                         double *lowest);
+
+/// How far the surface of a geom is from its centre along the unit direction n; of a capsule's ends what its cylinder has.
+double cav_geom_exit(const cav_geom *geom, const cav_pose *pose, const double n[3]);
+
+/// A cost on what a frame sensor of an object reads, which leads a guess and is no part of the problem.
+cav_term cav_leading_term(cav_sensor_type type, cav_object_type object_type, int object, const double *target);
+
+#endif
