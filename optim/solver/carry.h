@@ -9,9 +9,9 @@ enum { CAV_CARRY_TERMS = 5 };
 /// Terms that bring the hands to two places of a free body, keep it from tumbling, where it is until then and where it is asked
 /// for once they leave it; and how the body that has the hands comes and goes along.
 typedef struct cav_carry {
-  int found; ///< number of terms; 0: nothing that no actuator moves is asked for elsewhere, it moves at the start, or there are no two hands
-             ///< on a free base that can touch it
-  int lifts; ///< 1: it is asked for higher than it is; 0: it is pushed along
+  int found; ///< number of terms; 0: nothing that no actuator moves is asked for elsewhere, it moves at the start, or there
+             ///< are no two hands on a free base that can touch it
+  int lifts;                      ///< 1: it is asked for higher than it is; 0: it is pushed along
   cav_term term[CAV_CARRY_TERMS]; ///< they borrow what follows
   double place[2][3];             ///< m, of the right and the left hand in the frame of the body
   double upright[3];              ///< z axis of the body at the start
@@ -21,8 +21,8 @@ typedef struct cav_carry {
   double from, to;       ///< s, when the hands are there
 } cav_carry;
 
-/// away: part of its thickness that a hand keeps from the body, 1: it touches, less: it presses. CAV_NO_MEMORY, or what the dynamics
-/// says of start and goal. The result must stay where it is.
+/// away: part of its thickness that a hand keeps from the body, 1: it touches, less: it presses. CAV_NO_MEMORY, or what the
+/// dynamics says of start and goal. The result must stay where it is.
 cav_status cav_carry_find(const cav_problem *problem, double away, cav_carry *carry);
 
 /// The postures that the guess passes: q is room for 2 nq numbers.

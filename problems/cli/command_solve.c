@@ -315,11 +315,14 @@ static int solve_from(const cav_command_line *line, const cav_problem *problem, 
   if (!status && race.tell) cav_command_tell_postures(stderr, problem);
   if (!status && race.tell) cav_command_tell_axes(stderr, problem);
   if (!status && race.tell) cav_command_tell_guess(stderr, problem, 0);
-  if (!status && race.tell && !race.entry[0].strategy.stated)
-    fprintf(stderr,
-            "the way from start to goal runs into a solid or the ground and no waypoint of a <guess> leads over it: "
-            "begun %s\n",
-            race.entry[0].strategy.text);
+  const cav_strategy *first = &race.entry[0].strategy;
+  if (!status && race.tell && (first->hand || !first->stated))
+    fprintf(stderr, "%s: begun %s\n",
+            first->hand ? "the file has no <guess>, and no term of it brings a hand to what has to be moved"
+                        : "the straight way from start to goal runs into a solid or the ground, or turns feet where "
+                          "they stand, and no "
+                          "waypoint of a <guess> leads otherwise",
+            first->text);
   if (!status) status = run_race(&race, line, &tick, &error);
   int best = status ? -1 : cav_race_best(&race, line->strategies > 1), done = CAV_EXIT_INTERNAL;
   if (best >= 0 && race.tell && !interrupted && !cav_race_success(&race.entry[best].report)) tell_cause(&race);
