@@ -137,6 +137,16 @@ static void test_both(void) {
     // the body follows the crate by what arms do not reach; the carton stays in reach
     CHECK(i ? c.go[0] == 0 : c.go[0] > 0.1 && c.go[0] <= 0.3);
     CHECK_NEAR(c.go[1], 0, 1e-12);
+    // towards the body, it would be pulled
+    double target[3] = {0.45, 0, 0.451};
+    cav_term term[40];
+    CHECK(p->nterm <= 40);
+    memcpy(term, p->term, (size_t)p->nterm * sizeof *term);
+    for (int k = 0; k < p->nterm; k++)
+      if (!strcmp(term[k].name, "crate on")) term[k].target = target;
+    cav_problem pulled = *p;
+    pulled.term = term;
+    if (!i) CHECK(cav_carry_find(&pulled, 1, &c) == CAV_OK && !c.found);
     cav_problem_free(p);
   }
 }

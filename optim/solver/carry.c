@@ -20,6 +20,9 @@ static const double begins = 0.3, before_first = 0.6, leaves = 0.7;
 /// Of the height at which a body would tip over its edge; of its half width, and of the reach of an arm, how far hands are.
 static const double steady = 0.9, within_width = 0.7, reached = 0.9;
 
+/// Cosine of a way that leads back to the base.
+static const double nearer = 0.5;
+
 /// Speed at which the base comes to it, m/s, and the way from which it has to, m.
 static const double pace = 0.8, least_step = 0.05;
 
@@ -74,29 +77,22 @@ static int is_still(const cav_problem *p, int joint) {
   return 1;
 }
 
+/// Whether terms ask for the goal's posture of some dofs, or of all, at the end.
+static int is_asked_at_end(const cav_problem *p, cav_dof_set dofs) {
+  int asked = 0;
+  for (int i = 0; i < p->nterm && !asked; i++) {
+    const cav_term *term = &p->term[i];
+    const int last = term->to < 0 || term->to >= p->duration;
+    asked = term->quantity == CAV_QUANTITY_CONFIGURATION && last && term->from > 0 && cav_term_asks(term) &&
+            (term->dofs == CAV_DOFS_ALL || term->dofs == dofs);
+  }
+  return asked;
+}
+
 /// Whether terms say where the root is at the end, or the goal has it elsewhere.
 static int is_root_bound(const cav_problem *p, int root) {
   const double *a = p->q_start + p->model->joint[root].q, *b = p->q_goal + p->model->joint[root].q;
-  int bound = hypot(b[0] - a[0], b[1] - a[1]) >= CAV_THING_WAY;
-  for (int i = 0; i < p->nterm && !bound; i++) {
-    const cav_term *term = &p->term[i];
-    const int last = term->to < 0 || term->to >= p->duration;
-    bound = term->quantity == CAV_QUANTITY_CONFIGURATION && last && term->from > 0 && cav_term_asks(term) &&
-            (term->dofs == CAV_DOFS_ALL || term->dofs == CAV_DOFS_ROOT_LINEAR);
-  }
-  return bound;
-}
-
-/// Whether terms ask for a posture of the joints at the end.
-static int is_posture_bound(const cav_problem *p) {
-  int bound = 0;
-  for (int i = 0; i < p->nterm && !bound; i++) {
-    const cav_term *term = &p->term[i];
-    const int last = term->to < 0 || term->to >= p->duration;
-    bound = term->quantity == CAV_QUANTITY_CONFIGURATION && last && term->from > 0 && cav_term_asks(term) &&
-            (term->dofs == CAV_DOFS_ALL || term->dofs == CAV_DOFS_JOINTS);
-  }
-  return bound;
+  return hypot(b[0] - a[0], b[1] - a[1]) >= CAV_THING_WAY || is_asked_at_end(p, CAV_DOFS_ROOT_LINEAR);
 }
 
 /// Finds hands, arms and the way to the body; 0: there are none, or they cannot touch it.
@@ -160,7 +156,7 @@ static void find_back(const hands *h, double away, double place[2][3]) {
   static const double up[3] = {0, 0, 1};
   double n[3] = {-h->thing.way[0], -h->thing.way[1], 0}, across[3], centre[3], lowest, none;
   normalise3(n);
-  set3(across, -n[1], n[0], 0); // to the left of what comes along the way is the right of -n: see the sign below
+  set3(across, -n[1], n[0], 0); // to the right of who goes that way
   const double depth = cav_thing_surface(h->m, h->state, h->thing.link, n, centre, &lowest);
   const double width = cav_thing_surface(h->m, h->state, h->thing.link, across, centre, &none);
   const double top = centre[2] + cav_thing_surface(h->m, h->state, h->thing.link, up, centre, &none);
@@ -182,7 +178,7 @@ static void find_times(const cav_problem *p, const hands *h, double come, cav_ca
   const double end = h->thing.time;
   c->from = fmin(fmax(begins * end, come / pace), before_first * fmin(end, fmax(h->thing.first, begins * end)));
   const int held = c->lifts && h->thing.way[2] >= CAV_THING_WAY;
-  c->to = !held && is_posture_bound(p) ? fmax(leaves * end, c->from + p->timestep) : end;
+  c->to = !held && is_asked_at_end(p, CAV_DOFS_JOINTS) ? fmax(leaves * end, c->from + p->timestep) : end;
 }
 
 static void lay(const hands *h, const cav_pose *body, double place[2][3], cav_carry *c) {
@@ -209,6 +205,12 @@ static void lay(const hands *h, const cav_pose *body, double place[2][3], cav_ca
   c->found = c->to < h->thing.time ? CAV_CARRY_TERMS : CAV_CARRY_TERMS - 1;
   for (int k = 0; k < 2; k++)
     if (!isfinite(norm3(c->place[k]))) c->found = 0;
+}
+
+/// Whether the body is asked for nearer to the root: hands on its far side would lead the root through it.
+static int is_pulled(const hands *h) {
+  const double *way = h->thing.way, along = way[0] * h->toward[0] + way[1] * h->toward[1];
+  return along < -nearer * hypot(way[0], way[1]);
 }
 
 /// How far the root has to go for a place to be in reach, m: the way there, which it goes.
@@ -255,8 +257,9 @@ cav_status cav_carry_find(const cav_problem *problem, double away, cav_carry *ca
     carry->lifts = h.thing.rise >= CAV_THING_WAY;
     carry->thing = free_joint(m, h.thing.link);
     carry->root = free_joint(m, m->body[roles.body[CAV_ROLE_RIGHT_HAND]].link);
-    const int usable = carry->thing >= 0 && carry->root >= 0 && is_still(problem, carry->thing);
-    if (usable && find_hands(&h, &roles, carry->root)) find_carry(&h, away, carry);
+    const int alone = m->link[h.thing.link].root == h.thing.link;
+    const int usable = carry->thing >= 0 && carry->root >= 0 && alone && is_still(problem, carry->thing);
+    if (usable && find_hands(&h, &roles, carry->root) && (carry->lifts || !is_pulled(&h))) find_carry(&h, away, carry);
   }
   cav_state_free(state);
   return status;
