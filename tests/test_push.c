@@ -151,6 +151,26 @@ static void test_both(void) {
   }
 }
 
+/// A file that says nothing of hands is begun with both; one whose terms bring them there as it states.
+static void test_begun(void) {
+  for (int told = 0; told < 2; told++) {
+    cav_error error = {0};
+    cav_strategy strategy[CAV_STRATEGIES];
+    int n;
+    const char *file = told ? "/tests/unseen/carton-lift.xml" : "/tests/pushing/carton.xml";
+    char path[300];
+    snprintf(path, sizeof path, "%s%s", CAVORT_SOURCE_ROOT, file);
+    cav_problem *p = cav_problem_load(path, NULL, &error);
+    if (!CHECK(p != NULL)) continue;
+    CHECK(cav_strategy_list(p, strategy, &n) == CAV_OK);
+    CHECK(strategy[0].hand == (told ? 0 : 2) && !strcmp(strategy[0].name, "stated"));
+    const cav_strategy *carry = find(strategy, n, "carry");
+    CHECK(told ? carry && carry->hand == 2 : !carry && find(strategy, n, "line"));
+    cav_strategies_clear(strategy, n);
+    cav_problem_free(p);
+  }
+}
+
 /// Nothing to push: a hopper alone.
 static void test_none(void) {
   cav_error error = {0};
@@ -171,6 +191,7 @@ int main(void) {
   test_components();
   test_touched();
   test_both();
+  test_begun();
   test_none();
   static const struct {
     const char *name;

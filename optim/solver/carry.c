@@ -154,10 +154,12 @@ static void find_sides(const hands *h, const cav_pose *body, double away, double
 /// Where they push it from, in the world: opposite to the way, side by side, where it does not tip.
 static void find_back(const hands *h, double away, double place[2][3]) {
   static const double up[3] = {0, 0, 1};
-  double n[3] = {-h->thing.way[0], -h->thing.way[1], 0}, across[3], centre[3], lowest, none;
+  double n[3] = {-h->thing.way[0], -h->thing.way[1], 0}, ahead[3], across[3], centre[3], lowest, none;
   normalise3(n);
+  scale3(ahead, -1, n);
   set3(across, -n[1], n[0], 0); // to the right of who goes that way
   const double depth = cav_thing_surface(h->m, h->state, h->thing.link, n, centre, &lowest);
+  const double edge = cav_thing_surface(h->m, h->state, h->thing.link, ahead, centre, &none);
   const double width = cav_thing_surface(h->m, h->state, h->thing.link, across, centre, &none);
   const double top = centre[2] + cav_thing_surface(h->m, h->state, h->thing.link, up, centre, &none);
   double side[3];
@@ -169,7 +171,7 @@ static void find_back(const hands *h, double away, double place[2][3]) {
     cav_object_pose(h->m, h->state, CAV_OBJECT_GEOM, h->geom[k], &hand);
     axpy3(place[k], centre, depth + away * cav_geom_reach(geom, &hand, n), n);
     axpy3(place[k], place[k], k ? -apart : apart, across);
-    const double thick = cav_geom_reach(geom, &hand, up), tips = lowest + steady * depth / h->friction;
+    const double thick = cav_geom_reach(geom, &hand, up), tips = lowest + steady * edge / h->friction;
     place[k][2] = fmax(fmin(fmin(h->at[k][2], tips), top - thick), lowest + thick);
   }
 }

@@ -261,10 +261,11 @@ static cav_status add_pumped(const cav_problem *problem, cav_strategy *strategy,
 
 /// With hands brought first to what has to be pushed, carried or touched: both of what stands on a free base, or else one.
 /// A file without a guess whose terms bring no hands there is begun so.
-static cav_status add_pushed(const cav_problem *problem, cav_strategy *strategy, int *n, guesses *g) {
+static cav_status add_pushed(const cav_problem *problem, cav_strategy *strategy, int *n, const cav_strategy *stated,
+                             guesses *g) {
   cav_hand hand = {.found = 0};
   cav_carry carry;
-  cav_strategy push = g->stated;
+  cav_strategy push = *stated;
   if (problem->cycle.on) return CAV_OK;
   cav_status status = cav_carry_find(problem, 1, &carry);
   if (!status && !carry.found) status = cav_hand_find(problem, 1, &hand);
@@ -278,7 +279,7 @@ static cav_status add_pushed(const cav_problem *problem, cav_strategy *strategy,
       : hand.touches
           ? "with what is to touch brought there first, contacts sharp from there on"
           : "with a hand brought first to the side that what has to move is pushed from, contacts sharp from there on";
-  g->led = carry.found && !g->decorated && !g->collides && problem->guess == CAV_GUESS_INTERPOLATE &&
+  g->led = carry.found && !g->decorated && !g->collides && !g->sinks && problem->guess == CAV_GUESS_INTERPOLATE &&
            !cav_upright_held(problem);
   if (g->led)
     begin_with(strategy, &push);
@@ -402,7 +403,7 @@ cav_status cav_strategy_list(const cav_problem *problem, cav_strategy strategy[C
   int swings_up;
   cav_status status = add_stated(problem, strategy, n, &stated);
   if (status == CAV_OK) status = find_guesses(problem, &stated, strategy, &g);
-  if (status == CAV_OK) status = add_pushed(problem, strategy, n, &g);
+  if (status == CAV_OK) status = add_pushed(problem, strategy, n, &stated, &g);
   if (status == CAV_OK && !cav_upright_held(problem)) status = add_upright(problem, strategy, n, &stated);
   if (status == CAV_OK) status = add_posture(problem, strategy, n, &stated);
   if (status == CAV_OK) status = add_pumped(problem, strategy, n, &swings_up);
