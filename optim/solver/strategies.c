@@ -18,6 +18,8 @@
 #include "pump.h"
 #include "upright.h"
 
+_Static_assert((int)CAV_HAND_TERMS <= (int)CAV_CARRY_TERMS, "the room for terms that lead");
+
 /// Over obstacles limbs swing as much wider and slower.
 static const double wide = 1.6, leisure = 0.6;
 
@@ -452,6 +454,9 @@ static cav_schedule resumed(const cav_schedule *schedule) {
   return rest;
 }
 
+/// Fraction of the cost that a step may still save where both hands have led: terms that are no part of the problem are in it.
+static const double leads_to = 0.05;
+
 /// What leads a guess: terms that are no part of the problem, and what the guess passes.
 typedef struct leading {
   cav_hand hand;
@@ -463,6 +468,7 @@ typedef struct leading {
 } leading;
 
 static void add_terms(const cav_problem *problem, const cav_term *more, int n, leading *l, cav_problem *led) {
+  assert(n <= CAV_CARRY_TERMS);
   memcpy(l->term, problem->term, (size_t)problem->nterm * sizeof *l->term);
   memcpy(l->term + problem->nterm, more, (size_t)n * sizeof *more);
   led->term = l->term, led->nterm = problem->nterm + n;
@@ -473,8 +479,8 @@ static cav_status lead_both(const cav_problem *problem, double away, leading *l,
   cav_status status = cav_carry_find(problem, away, &l->carry);
   if (status) return status;
   add_terms(problem, l->carry.term, l->carry.found, l, led);
-  led->schedule.kinematics = !l->carry.lifts;
-  led->schedule.optimality = 0.05;
+  if (!l->carry.lifts) led->schedule.kinematics = 1;
+  led->schedule.optimality = leads_to;
   if (is_decorated(problem) || !l->carry.found) return CAV_OK;
   cav_carry_poses(problem, &l->carry, l->q, l->pose);
   cav_problem moved = *problem;
