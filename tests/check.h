@@ -22,6 +22,15 @@ enum { CHECK_SKIPPED = 77 }; ///< exit status by which meson knows a skipped tes
 
 static int check_count, check_failed;
 
+/// Of passes that are alike sanitizers, which look for other faults, see every n-th.
+static inline int check_every(int n) {
+#ifdef SANITIZED
+  return n;
+#else
+  return n > 0;
+#endif
+}
+
 // one more check; returns whether it held
 static inline int check_note(int holds, const char *file, int line, const char *text) {
   check_count++;

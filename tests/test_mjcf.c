@@ -154,12 +154,7 @@ static const char good[] =
 
 // --- the n-th allocation fails ---
 
-#if defined(__has_feature)
-#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer) || __has_feature(memory_sanitizer)
-#define SANITIZED 1
-#endif
-#endif
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__) || !defined(__GLIBC__)
+#if !defined(SANITIZED) && !defined(__GLIBC__)
 #define SANITIZED 1
 #endif
 
