@@ -549,6 +549,77 @@ static void test_detour(void) {
   }
 }
 
+// what an arm's hand is asked for at the end, beyond a scene, and nothing else
+static cav_problem *hand_at(const char *scene, const char *more) {
+  static const char pattern[] =
+      "<problem name='at' model='" CAVORT_SOURCE_ROOT
+      "/problems/models/arm.xml'><scene>%s</scene><horizon duration='2.5' timestep='0.02'/>"
+      "<start><joint name='joint1' degrees='-50'/><joint name='joint2' degrees='60'/><joint name='joint4' "
+      "degrees='40'/>"
+      "<joint name='joint6' degrees='50'/></start><cost>"
+      "<sensor name='there' type='framepos' body='hand' target='.42 .25 .15' at='end' weight='3000'/>"
+      "<velocity dofs='all' at='end' weight='100'/>%s</cost></problem>";
+  char folder[] = "/tmp/cavort_hand_XXXXXX", path[100], text[1500];
+  if (!CHECK(mkdtemp(folder) != NULL)) return NULL;
+  cav_error error = {0};
+  snprintf(text, sizeof text, pattern, scene, more);
+  scene_write(folder, "p.xml", text);
+  snprintf(path, sizeof path, "%s/p.xml", folder);
+  cav_problem *p = cav_problem_load(path, NULL, &error);
+  if (!CHECK(p != NULL)) fprintf(stderr, "    %s\n", error.text);
+  unlink(path), rmdir(folder);
+  return p;
+}
+
+// a file without a goal whose hand is wanted behind a wall is begun by a posture that has it there, round the wall, clear of
+// all; nothing of that where the straight way there is free, or the start's posture is asked for at the end too
+static void test_reach(void) {
+  static const char wall[] = "<geom name='wall' type='box' pos='.45 0 .25' size='.2 .02 .25'/>";
+  static const struct {
+    const char *scene, *more;
+    int reaches;
+  } c[] = {{wall, "", 1},
+           {"", "", 0},
+           {wall, "<posture dofs='joints' at='end' weight='10'/>", 0},
+           {wall, "<posture dofs='joints' at='end' weight='10' within='any'/>", 1}};
+  for (size_t k = 0; k < sizeof c / sizeof *c; k++) {
+    cav_problem *p = hand_at(c[k].scene, c[k].more);
+    if (!p) return;
+    cav_strategy strategy[CAV_STRATEGIES];
+    cav_error error = {0};
+    int n;
+    CHECK(cav_strategy_list(p, strategy, &n) == CAV_OK && (strategy[0].nreach == 7) == c[k].reaches);
+    CHECK(!find(strategy, n, "hold") == !c[k].reaches);
+    if (k == 0 && strategy[0].nreach) {
+      // where the hand is there, by the model alone
+      double q[16];
+      cav_pose at;
+      cav_state *state = cav_state_new(p->model);
+      memcpy(q, p->q_start, (size_t)p->model->nq * sizeof *q);
+      for (int i = 0; i < strategy[0].nreach; i++) {
+        const cav_joint *joint = &p->model->joint[strategy[0].reach[i].joint];
+        q[joint->q] = strategy[0].reach[i].to;
+        CHECK(!joint->limited || (q[joint->q] > joint->range[0] && q[joint->q] < joint->range[1]));
+      }
+      CHECK(cav_position(p->model, state, q) == CAV_OK);
+      const cav_term *there = &p->term[0];
+      for (int i = 0; i < p->nterm && strcmp(there->name, "there"); i++) there = &p->term[i];
+      cav_object_pose(p->model, state, there->sensor.object_type, there->sensor.object, &at);
+      CHECK(hypot(hypot(at.pos[0] - 0.42, at.pos[1] - 0.25), at.pos[2] - 0.15) < 0.03);
+      for (int i = 0; i < state->ncontact; i++) CHECK(state->contact[i].dist > 0);
+      cav_state_free(state);
+      cav_solution *solution = NULL;
+      cav_verdict v;
+      CHECK(cav_strategy_solve(p, &strategy[0], NULL, NULL, &solution, &error) == CAV_OK);
+      if (CHECK(solution && solution->gain_q))
+        CHECK(cav_verify_solution(p, solution, &v, &error) == CAV_OK && v.certified && v.achieved);
+      cav_solution_free(solution);
+    }
+    cav_strategies_clear(strategy, n);
+    cav_problem_free(p);
+  }
+}
+
 int main(void) {
   test_through_ground();
   test_upright();
@@ -562,5 +633,6 @@ int main(void) {
   test_leap();
   test_solids();
   test_detour();
+  test_reach();
   return check_result();
 }

@@ -341,6 +341,12 @@ typedef enum cav_strategy_use {
                          ///< asked: a duration free up to twice the stated one, times of windows in proportion
 } cav_strategy_use;
 
+/// Where a hinge or slide is at the end of a guess that goes elsewhere than to the goal.
+typedef struct cav_reach {
+  int joint; ///< of the model
+  double to; ///< rad or m
+} cav_reach;
+
 /// A way to a motion: the guess and the schedule that a solve starts from.
 typedef struct cav_strategy {
   const char *name, *text;              ///< in a word, and in words
@@ -352,6 +358,8 @@ typedef struct cav_strategy {
   cav_guess guess;                      ///< what its guess is made from
   int nswing;                           ///< sines over joints of the guess
   cav_swing swing[CAV_STRATEGY_SWINGS]; ///< [nswing]
+  int nreach; ///< joints of a guess that ends elsewhere than at the goal: where terms of the end ask
+  cav_reach reach[CAV_STRATEGY_SWINGS]; ///< [nreach]
   int ground;                           ///< 1: its guess stands on what is below it
   int hand;                      ///< hands that are brought first to what has to be pushed, carried or touched: 1 or 2
   double height, from, to;       ///< not stated: of a ballistic arc, m, and when, s

@@ -57,8 +57,7 @@ static cav_status want_apart(const search *s, double distance) {
   return status;
 }
 
-// whether a joint may bow the way: an actuator of its own moves it, and nothing couples it
-static int may_bow(const cav_model *m, int j) {
+int cav_detour_moves(const cav_model *m, int j) {
   const cav_joint *joint = &m->joint[j];
   const int root = m->link[joint->link].root;
   if (joint->type != CAV_JOINT_HINGE && joint->type != CAV_JOINT_SLIDE) return 0;
@@ -112,24 +111,46 @@ static cav_status search_all(search *s, cav_strategy *strategy) {
   return status;
 }
 
-cav_status cav_detour_find(const cav_problem *problem, cav_strategy *strategy) {
+static search search_of(const cav_problem *problem) {
   const cav_model *m = problem->model;
-  cav_swing swing[CAV_STRATEGY_SWINGS];
   search s = {.bowed = *problem};
   s.bowed.guess = CAV_GUESS_INTERPOLATE;
   s.bowed.schedule.solids = CAV_SOLIDS_HARD;
   s.bowed.timestep = problem->duration / (KNOTS - 1);
-  s.bowed.swing = swing, s.bowed.nswing = 0;
-  strategy->nswing = 0;
-  for (int j = 0; j < m->njoint && s.bowed.nswing < CAV_STRATEGY_SWINGS; j++)
-    if (may_bow(m, j)) swing[s.bowed.nswing++] = (cav_swing){.joint = j, .frequency = 0.5 / problem->duration};
-  if (!s.bowed.nswing) return CAV_OK;
+  s.bowed.nswing = 0;
   s.state = cav_state_new(m);
   s.at = cav_trajectory_new(m, KNOTS, s.bowed.timestep);
   s.apart = calloc((size_t)m->npair + 1, sizeof *s.apart);
-  cav_status status = s.state && s.at && s.apart ? search_all(&s, strategy) : CAV_NO_MEMORY;
-  free(s.apart);
-  cav_state_free(s.state);
-  cav_trajectory_free(s.at);
+  return s;
+}
+
+static int has_memory(const search *s) { return s->state && s->at && s->apart; }
+
+static void search_free(search *s) {
+  free(s->apart);
+  cav_state_free(s->state);
+  cav_trajectory_free(s->at);
+}
+
+cav_status cav_detour_straight(const cav_problem *problem, int *is_free) {
+  search s = search_of(problem);
+  cav_status status = has_memory(&s) ? want_apart(&s, 0) : CAV_NO_MEMORY;
+  if (!status) status = is_clear(&s, is_free);
+  search_free(&s);
+  return status;
+}
+
+cav_status cav_detour_find(const cav_problem *problem, cav_strategy *strategy) {
+  const cav_model *m = problem->model;
+  cav_swing swing[CAV_STRATEGY_SWINGS];
+  int n = 0;
+  strategy->nswing = 0;
+  for (int j = 0; j < m->njoint && n < CAV_STRATEGY_SWINGS; j++)
+    if (cav_detour_moves(m, j)) swing[n++] = (cav_swing){.joint = j, .frequency = 0.5 / problem->duration};
+  if (!n) return CAV_OK;
+  search s = search_of(problem);
+  s.bowed.swing = swing, s.bowed.nswing = n;
+  cav_status status = has_memory(&s) ? search_all(&s, strategy) : CAV_NO_MEMORY;
+  search_free(&s);
   return status;
 }

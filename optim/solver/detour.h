@@ -8,4 +8,10 @@
 /// knot is in anything: into the strategy's swings, none where there are none or none were found.
 cav_status cav_detour_find(const cav_problem *problem, cav_strategy *strategy);
 
+/// Whether no knot of the straight way is in anything, by more than what start and goal are in it.
+cav_status cav_detour_straight(const cav_problem *problem, int *is_free);
+
+/// Whether a joint is one of those: an actuator of its own moves it, and nothing couples it.
+int cav_detour_moves(const cav_model *model, int joint);
+
 #endif

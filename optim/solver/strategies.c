@@ -16,6 +16,7 @@
 #include "leap.h"
 #include "periodicity.h"
 #include "pump.h"
+#include "reach.h"
 #include "upright.h"
 
 _Static_assert((int)CAV_HAND_TERMS <= (int)CAV_CARRY_TERMS, "the room for terms that lead");
@@ -160,10 +161,11 @@ static cav_status hold_over_ground(const cav_problem *problem, cav_strategy *beg
 /// Guesses of a problem from which strategies begin.
 typedef struct guesses {
   cav_strategy stated, plain, walk, fly; ///< straight from start to goal; with limbs swinging; by a flight
-  cav_strategy detour;                   ///< round what the straight way runs into; none without swings
-  int collides, decorated, sinks;        ///< what the stated guess does, and is
-  int pivots;                            ///< 1: it turns four feet or more on the spot, where they stand
-  int led;                               ///< 1: a file without a guess is begun with both hands led
+  cav_strategy detour, reach;            ///< round what the straight way runs into; to what terms of the end ask for
+
+  int collides, decorated, sinks; ///< what the stated guess does, and is
+  int pivots;                     ///< 1: it turns four feet or more on the spot, where they stand
+  int led;                        ///< 1: a file without a guess is begun with both hands led
 } guesses;
 
 /// With what no actuator moves kept upright. What tips is not mended by what else is missed, so this comes first where terms
@@ -322,6 +324,13 @@ static cav_status find_guesses(const cav_problem *problem, const cav_strategy *s
   g->detour.schedule.solids = problem->schedule.solids;
   if (status == CAV_OK && g->collides && !g->decorated && problem->guess == CAV_GUESS_INTERPOLATE)
     status = cav_detour_find(problem, &g->detour);
+  // where the goal is the start, what is asked for at the end is where the way goes
+  const int reaches =
+      !problem->cycle.on && !g->decorated && problem->guess == CAV_GUESS_INTERPOLATE && is_back(problem);
+  g->reach = g->plain;
+  g->reach.text = "to a posture that meets what is asked for at the end, round the solids in between";
+  g->reach.schedule.solids = problem->schedule.solids;
+  if (status == CAV_OK && reaches) status = cav_reach_find(problem, &g->reach);
   g->fly.text = "all of the way by an arc clear of solids, start and goal held before and after it";
   g->fly.schedule.solids = problem->schedule.solids;
   return status == CAV_OK ? flight(problem, &g->fly) : status;
@@ -335,7 +344,7 @@ static void add_plain(const cav_problem *problem, cav_strategy *strategy, int *n
     add(strategy, n, &g->plain, "line", "straight from start to goal");
   cav_strategy still = g->plain;
   still.guess = CAV_GUESS_HOLD;
-  const int held = !g->decorated && (holds || (stays && problem->guess == CAV_GUESS_INTERPOLATE));
+  const int held = !g->decorated && (holds || (stays && problem->guess == CAV_GUESS_INTERPOLATE && !g->reach.nreach));
   if (!problem->cycle.on && !g->sinks && !held) add(strategy, n, &still, "hold", "the start held");
 }
 
@@ -343,6 +352,7 @@ static void add_plain(const cav_problem *problem, cav_strategy *strategy, int *n
 static cav_status add_others(const cav_problem *problem, cav_strategy *strategy, int *n, const guesses *g) {
   // a file without a guess is begun so
   if (g->detour.nswing) begin_with(strategy, &g->detour);
+  if (g->reach.nreach) begin_with(strategy, &g->reach);
   if (g->collides) add_grown(problem, strategy, n, &g->stated, &g->walk, &g->fly);
   if (!g->collides && g->fly.height > 0 && problem->guess_height > 0) add_mended(strategy, n, &g->fly, "flight");
   if (g->pivots) begin_with(strategy, &g->walk);
@@ -581,12 +591,36 @@ static cav_status mend_pushed(cav_problem *taken, const cav_solve_options *optio
   return cav_solve(taken, &rest, start, solution, error);
 }
 
+/// From a guess that goes to where the strategy has joints at the end. A checkpoint of it is not gone on from either.
+static cav_status solve_reached(const cav_problem *taken, const cav_strategy *strategy,
+                                const cav_solve_options *options, cav_solution **solution, cav_error *error) {
+  const cav_model *m = taken->model;
+  cav_problem moved = *taken;
+  cav_solve_options begun = options ? *options : cav_solve_options_default();
+  begun.resume = NULL;
+  double *q = malloc((size_t)m->nq * sizeof *q);
+  cav_trajectory *at = cav_trajectory_new(m, (int)lround(taken->duration / taken->timestep) + 1, taken->timestep);
+  cav_status status = q && at ? CAV_OK : CAV_NO_MEMORY;
+  if (!status) {
+    memcpy(q, taken->q_start, (size_t)m->nq * sizeof *q);
+    for (int k = 0; k < strategy->nreach; k++) q[m->joint[strategy->reach[k].joint].q] = strategy->reach[k].to;
+    moved.q_goal = q;
+    status = cav_guess_fill(&moved, q, at);
+  }
+  *solution = NULL;
+  if (!status) status = cav_solve(taken, &begun, at, solution, error);
+  cav_trajectory_free(at);
+  free(q);
+  return status;
+}
+
 cav_status cav_strategy_solve(const cav_problem *problem, const cav_strategy *strategy,
                               const cav_solve_options *options, const cav_trajectory *start, cav_solution **solution,
                               cav_error *error) {
   cav_problem taken;
   cav_strategy_apply(problem, strategy, &taken);
   if (strategy->hand && !start) return solve_pushed(&taken, strategy->hand, options, solution, error);
+  if (strategy->nreach && !start) return solve_reached(&taken, strategy, options, solution, error);
   const cav_checkpoint *resume = options ? options->resume : NULL;
   int second = resume && resume->order == strategy->order;
   if (!strategy->first_midpoint || start || second) {

@@ -319,9 +319,11 @@ static int solve_from(const cav_command_line *line, const cav_problem *problem, 
   if (!status && race.tell && (first->hand || !first->stated))
     fprintf(stderr, "%s: begun %s\n",
             first->hand ? "the file has no <guess>, and no term of it brings a hand to what has to be moved"
-                        : "the straight way from start to goal runs into a solid or the ground, or turns feet where "
-                          "they stand, and no "
-                          "waypoint of a <guess> leads otherwise",
+            : first->nreach
+                ? "the file has no <goal>, and the straight way to what is asked for at the end runs into something"
+                : "the straight way from start to goal runs into a solid or the ground, or turns feet where "
+                  "they stand, and no "
+                  "waypoint of a <guess> leads otherwise",
             first->text);
   if (!status) status = run_race(&race, line, &tick, &error);
   int best = status ? -1 : cav_race_best(&race, line->strategies > 1), done = CAV_EXIT_INTERNAL;
