@@ -342,10 +342,10 @@ typedef enum cav_strategy_use {
 } cav_strategy_use;
 
 /// Where a hinge or slide is at the end of a guess that goes elsewhere than to the goal.
-typedef struct cav_reach {
+typedef struct cav_joint_value {
   int joint; ///< of the model
   double to; ///< rad or m
-} cav_reach;
+} cav_joint_value;
 
 /// A way to a motion: the guess and the schedule that a solve starts from.
 typedef struct cav_strategy {
@@ -359,8 +359,8 @@ typedef struct cav_strategy {
   int nswing;                           ///< sines over joints of the guess
   cav_swing swing[CAV_STRATEGY_SWINGS]; ///< [nswing]
   int nreach; ///< joints of a guess that ends elsewhere than at the goal: where terms of the end ask
-  cav_reach reach[CAV_STRATEGY_SWINGS]; ///< [nreach]
-  int ground;                           ///< 1: its guess stands on what is below it
+  cav_joint_value reach[CAV_STRATEGY_SWINGS]; ///< [nreach]
+  int ground;                                 ///< 1: its guess stands on what is below it
   int hand;                      ///< hands that are brought first to what has to be pushed, carried or touched: 1 or 2
   double height, from, to;       ///< not stated: of a ballistic arc, m, and when, s
   int flies;                     ///< 1: start and goal are held before and after that arc

@@ -1,6 +1,6 @@
-/// Inverse kinematics for an arm whose file says where its hand has to be, and not how: with the start held as a guess the hand is
-/// drawn straight through what stands between, and stays against it. So postures that meet the terms of the end are sought by
-/// least squares, clear of everything, from the start and from an even sequence about it; where the straight way to the first
+/// Inverse kinematics for an arm whose file says where its hand has to be, and not how: with the start held as a guess the hand
+/// is drawn straight through what stands between, and stays against it. So postures that meet the terms of the end are sought
+/// by least squares, clear of everything, from the start and from an even sequence about it; where the straight way to the first
 /// of them is free nothing is needed. Else the nearest with a free way, straight or bowed (detour.c), is where the guess goes.
 #include "reach.h"
 
@@ -168,7 +168,7 @@ static void set_reach(const reacher *r, const double *q, cav_strategy *strategy)
   strategy->nreach = 0;
   for (int j = 0; j < m->njoint; j++)
     if (r->moves[m->joint[j].dof])
-      strategy->reach[strategy->nreach++] = (cav_reach){.joint = j, .to = q[m->joint[j].q]};
+      strategy->reach[strategy->nreach++] = (cav_joint_value){.joint = j, .to = q[m->joint[j].q]};
 }
 
 // the first of these with a free way, straight or else bowed
