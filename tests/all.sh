@@ -15,6 +15,9 @@ passed=0
 failed=0
 skipped=0
 
+# what is undefined about pointers is left to AddressSanitizer, which sees what comes of it: with these checks clang takes eight
+# times as long over files of vectors
+pointers=-fno-sanitize=null,alignment,object-size,pointer-overflow
 # the sanitizers' findings end a test
 export UBSAN_OPTIONS=halt_on_error=1:print_stacktrace=1 ASAN_OPTIONS=detect_leaks=1
 
@@ -153,7 +156,7 @@ example() { awk '/^```$/ { on = 0 } on { print } /^```c$/ { on = 1 }' README.md 
 if sh problems/install.sh test; then
   check "build, gcc" build gcc gcc --buildtype=release && tests gcc
   check "build, clang with sanitizers" build clang clang --buildtype=debugoptimized -Db_sanitize=address,undefined \
-    -Db_lundef=false -Dc_args=-g1 &&
+    -Db_lundef=false "-Dc_args=['-g1', '$pointers']" &&
     tests clang --timeout-multiplier 6 --no-suite long
   check "headers alone, C17 and C++17" headers
   if command -v clang-format >/dev/null 2>&1; then

@@ -102,6 +102,34 @@ static void check_rubbing(repaired *r) {
   }
 }
 
+// an arm that leans on things is kept off them, not one beside a box that it may have to move
+static void check_leaning(void) {
+  static const char pattern[] =
+      "<mujoco><worldbody><geom type='box' size='.1 .1 .1' pos='.6 0 .1'/>"
+      "<body pos='0 0 .5'><joint name='a' axis='0 1 0'/><geom type='capsule' fromto='0 0 0 .5 0 0' size='.03'/></body>"
+      "%s</worldbody><actuator><motor joint='a' ctrllimited='true' ctrlrange='-9 9'/></actuator></mujoco>";
+  static const char *const beside[] = {"", "<body pos='1 0 .1'><freejoint/><geom type='box' size='.1 .1 .1'/></body>"};
+  for (int hover = 0; hover < 2; hover++) {
+    for (int k = 0; k < 2; k++) {
+      char text[700];
+      snprintf(text, sizeof text, pattern, beside[k]);
+      cav_model *m = scene_load(text);
+      if (!CHECK(m != NULL)) return;
+      cav_problem p = cav_problem_default(m);
+      cav_verdict v = {.achieved = 1, .closed_loop_seconds = 1};
+      *(hover ? &v.hover_fraction : &v.slip_mean_m_s) = 0.05;
+      cav_strategy stated = {.name = "stated", .stated = 1, .order = p.order, .schedule = p.schedule}, mended;
+      int found;
+      CHECK(cav_strategy_repair(&p, &stated, &v, 0, &mended, &found) == CAV_OK && found);
+      CHECK_TEXT(mended.changed, k == 0  ? "<force weight=\"10000\"/>"
+                                 : hover ? "next_gap=\"exact\""
+                                         : "<last smoothing=\"0.000125\"/>");
+      cav_strategy_clear(&mended);
+      cav_model_free(m);
+    }
+  }
+}
+
 // closed loops that are lost: contact forces cost something, then half the step
 static void check_loops(repaired *r) {
   const cav_verdict lost = {.achieved = 1};
@@ -230,6 +258,7 @@ static void check_goals(repaired *r) {
 
 // the usual cure of what is missed first, one more at each call; the problem stays as it was
 int main(void) {
+  check_leaning();
   void (*const check[])(repaired *) = {check_loops, check_most_missed, check_record, check_slides,
                                        check_goals, check_targets,     check_rubbing};
   for (size_t i = 0; i < sizeof check / sizeof *check; i++) {

@@ -794,6 +794,22 @@ check "a touch sensor of a body has it bear" grep -qE "^  sensor +touch +0.[456]
 "$cavort" solve beats.xml -o beats --strategies 1 --threads 1 >out 2>err
 check "what bears on the ground is told of" grep -qE "^  note: on its way the ground bears 'arm', geom club \(up to [0-9.]+ N at [0-9.]+ s\); the weight is 41.2 N" out
 
+# what falls by 0.3 m and has 8 cm to stop in takes many weights, and what the note says of it softens that
+cat >lander.xml <<TEXT
+<mujoco><worldbody><geom name="floor" type="plane" size="2 2 .1"/><body name="trunk" pos="0 0 .3"><freejoint/><geom type="box" size=".1 .1 .05" mass="5"/>
+<body name="foot" pos="0 0 -.15"><joint name="leg" type="slide" axis="0 0 1" range="-.04 .04" limited="true"/><geom type="box" size=".1 .1 .02" mass="1"/></body></body></worldbody>
+<actuator><motor joint="leg" ctrllimited="true" ctrlrange="-2000 2000"/></actuator></mujoco>
+TEXT
+cat >lands.xml <<TEXT
+<problem name="lands" model="lander.xml"><horizon duration="0.6" timestep="0.01"/><start height="floor" rise="0.3"/><goal height="floor"/>
+<cost><velocity name="rest" dofs="all" at="end" weight="100"/></cost></problem>
+TEXT
+"$cavort" solve lands.xml -o lands --strategies 1 --threads 1 >out 2>err
+check "what lands hard is told of" grep -qE "^  note: 'foot' takes [0-9]+ N at 0.2[0-9] s, 1[0-9] times the weight; <force body=\"foot\" weight=\"1\"/> softens that" out
+sed 's#</cost>#<force body="foot" weight="1"/></cost>#' lands.xml >softly.xml
+"$cavort" solve softly.xml -o softly --strategies 1 --threads 1 >out 2>err
+check "a cost on its force is the end of that" sh -c 'grep -q "^certified" out && ! grep -q "times the weight" out'
+
 # not what hovers after it has borne; not the feet of a gait, whose period has no ends of its own
 sed 's#<posture name="back"#<sensor name="after" type="framepos" site="tip" component="z" target="0.045" at="1.1" weight="3000"/>&#' beats.xml >after.xml
 "$cavort" solve after.xml -o after --strategies 1 --threads 1 >out 2>err

@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "cavort/solve.h"
+#include "detour.h"
 #include "schedule.h"
 #include "upright.h"
 
@@ -18,6 +19,7 @@ typedef enum cure {
   GOALS,     ///< heavier weights of goals
   BIT,       ///< a bit heavier ones, as much as what is missed needs
   SLIP,      ///< a heavier weight of slip
+  OFF,       ///< so much that what need not touch anything does not
   SELF,      ///< what leans on its own links pays
   SLIDING,   ///< the convex law of contacts that slide: it has one solution
   ORDER,     ///< the order of momentum
@@ -33,8 +35,22 @@ typedef enum cure {
 } cure;
 
 enum { CURES = 3 };
-static const double force_weight = 1, self_weight = 1000, heavier = 10, harder = 4, lighter = 0.04, softer = 6,
-                    longer = 2, closer = 2, soft = 0.03, slack = 0.75;
+static const double force_weight = 1, off_weight = 1e4, self_weight = 1000, heavier = 10, harder = 4, lighter = 0.04,
+                    softer = 6, longer = 2, closer = 2, soft = 0.03, slack = 0.75;
+
+/// Whether all that moves hangs on the world by joints of its own drives, as arms do, and no term asks for a touch: it leans
+/// on things only because that saves effort.
+static int only_hangs(const cav_problem *p) {
+  const cav_model *m = p->model;
+  for (int l = 1; l < m->nlink; l++) {
+    if (m->link[l].root != l) continue;
+    for (int j = m->link[l].joint; j < m->link[l].joint + m->link[l].njoint; j++)
+      if (!cav_detour_moves(m, j)) return 0;
+  }
+  for (int i = 0; i < p->nterm; i++)
+    if (p->term[i].quantity == CAV_QUANTITY_SENSOR && p->term[i].sensor.type == CAV_SENSOR_TOUCH) return 0;
+  return 1;
+}
 
 /// What a motion misses first, in the order of a certificate (METHOD.md, 6), most of momentum, slip and hover, and its
 /// cures. Forces near a record are what is looked for: none of them costs anything. A residual beyond its bound is
@@ -46,7 +62,8 @@ static const cure *cures_of(const cav_problem *p, const cav_verdict *v) {
                     rub[] = {SELF, SMOOTHING, SLIP}, limbs[] = {CLOSER, SELF, STEP}, hover[] = {GAP, SMOOTHING, STEP},
                     fold[] = {SLIDING, STEP, NONE}, lost[] = {FORCE, STEP, SLACK}, target[] = {EFFORT, GOALS, NONE},
                     close[] = {BIT, EFFORT, GOALS}, fades[] = {SMOOTHING, GAP, STEP}, near[] = {STEP, SLACK, NONE},
-                    again[] = {STEP, SLIDING, NONE}, ground[] = {STEP, LOOSE, SOFTER}, none[] = {NONE};
+                    again[] = {STEP, SLIDING, NONE}, off_slip[] = {OFF, SMOOTHING, SLIP},
+                    off_hover[] = {OFF, GAP, SMOOTHING}, ground[] = {STEP, LOOSE, SOFTER}, none[] = {NONE};
   if (v->certified)
     return v->achieved ? none : v->missed_most > 0 && v->missed_most < CAV_MISSED_LITTLE ? close : target;
   if (!cav_verdict_feasible(v)) return cav_problem_has_record(p) ? ground : forces;
@@ -57,10 +74,11 @@ static const cure *cures_of(const cav_problem *p, const cav_verdict *v) {
          air = v->hover_fraction / CAV_TOLERANCE_HOVER;
   if (momentum > 1 && momentum >= fmax(slide, air)) return turned;
   // what is smoothed slides by a part of the smoothing in every step
-  if (slide > 1 && slide >= air) return v->slip_self > 0.5 ? rub : slip;
+  if (slide > 1 && slide >= air) return v->slip_self > 0.5 ? rub : only_hangs(p) ? off_slip : slip;
   // a stated smoothing beyond the usual one is what holds things off the ground
   int blurred = p->schedule.last.smoothing > cav_problem_default(p->model).schedule.last.smoothing;
   if (air > 1 && v->hover_self > 0.5) return limbs;
+  if (air > 1 && !blurred && only_hangs(p)) return off_hover;
   if (air > 1) return blurred ? fades : hover;
   if (v->replay_step_max_error > CAV_TOLERANCE_STEP) return cav_problem_has_record(p) ? again : fold;
   if (v->residual_fraction_max > v->residual_within) return none;
@@ -74,7 +92,7 @@ static cav_status own_terms(const cav_problem *p, cav_strategy *s) {
   int n = s->term ? s->nterm : p->nterm;
   cav_term *all = calloc((size_t)n + 1, sizeof *all);
   if (!all) return CAV_NO_MEMORY;
-  memcpy(all, s->term ? s->term : p->term, (size_t)n * sizeof *all);
+  if (n > 0) memcpy(all, s->term ? s->term : p->term, (size_t)n * sizeof *all);
   free(s->term);
   s->term = all;
   s->nterm = n;
@@ -143,7 +161,8 @@ static cav_status loosen_slip(const cav_problem *p, cav_strategy *s) {
 
 /// Whether a cure changes what the motion does, not what contacts obey.
 static int is_of_motion(cure c) {
-  return c == FORCE || c == SELF || c == GOALS || c == BIT || c == SLIP || c == LOOSE || c == EFFORT || c == SLACK;
+  return c == FORCE || c == OFF || c == SELF || c == GOALS || c == BIT || c == SLIP || c == LOOSE || c == EFFORT ||
+         c == SLACK;
 }
 
 static cav_status change(const cav_problem *p, const cav_verdict *v, cure c, cav_strategy *s) {
@@ -153,6 +172,8 @@ static cav_status change(const cav_problem *p, const cav_verdict *v, cure c, cav
   switch (c) {
     case FORCE:
       return weigh_forces(p, CAV_QUANTITY_FORCE, force_weight, s);
+    case OFF:
+      return weigh_forces(p, CAV_QUANTITY_FORCE, off_weight, s);
     case SELF:
       return weigh_forces(p, CAV_QUANTITY_SELF_FORCE, self_weight, s);
     case GOALS:

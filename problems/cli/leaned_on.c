@@ -291,6 +291,63 @@ static void tell_hovering(FILE *out, const cav_problem *problem, const cav_traje
   cav_state_free(state);
 }
 
+// times its weight from which on what one link of a tree takes of the world is told: runners take two to three on a foot
+static const double hard = 4;
+
+/// What each link takes of the world at its worst, N, and when.
+typedef struct blow {
+  double now[3], most;
+  int knot;
+} blow;
+
+static void end_knot(blow *of, int n, int knot) {
+  for (int l = 0; l < n; l++) {
+    const double size = hypot(hypot(of[l].now[0], of[l].now[1]), of[l].now[2]);
+    if (size > of[l].most) of[l].most = size, of[l].knot = knot;
+    memset(of[l].now, 0, sizeof of[l].now);
+  }
+}
+
+static int has_force_cost(const cav_problem *problem, int link) {
+  for (int i = 0; i < problem->nterm; i++) {
+    const cav_term *term = &problem->term[i];
+    const int all = term->body == 0, own = !all && problem->model->body[term->body].link == link;
+    if (term->quantity == CAV_QUANTITY_FORCE && term->weight > 0 && (all || own)) return 1;
+  }
+  return 0;
+}
+
+/// Links that take many weights of their tree at once, as one foot that lands stiff, unless their forces cost.
+static void tell_blows(FILE *out, const cav_problem *problem, const cav_forces *forces, double timestep) {
+  const cav_model *m = problem->model;
+  blow *of = calloc((size_t)m->nlink, sizeof *of);
+  for (int i = 0; of && i < forces->nforce; i++) {
+    const cav_contact_force *f = &forces->force[i];
+    const int one = m->geom[f->geom1].link, other = m->geom[f->geom2].link;
+    if (i > 0 && f->knot != f[-1].knot) end_knot(of, m->nlink, f[-1].knot);
+    for (int k = 0; k < 3 && (one == 0 || other == 0); k++)
+      of[one].now[k] -= f->force[k], of[other].now[k] += f->force[k];
+  }
+  if (of && forces->nforce) end_knot(of, m->nlink, forces->force[forces->nforce - 1].knot);
+  for (int root = 1; of && root < m->nlink; root++) {
+    double mass = 0;
+    if (m->link[root].root != root || !m->link[root].driven || !cav_command_floats(m, root)) continue;
+    for (int l = root; l < m->nlink; l++)
+      if (m->link[l].root == root) mass += m->link[l].mass;
+    const double weight = mass * hypot(hypot(m->gravity[0], m->gravity[1]), m->gravity[2]);
+    int worst = root;
+    for (int l = root; l < m->nlink; l++)
+      if (m->link[l].root == root && of[l].most > of[worst].most) worst = l;
+    if (!(weight > 0) || of[worst].most < hard * weight || has_force_cost(problem, worst)) continue;
+    const char *name = or_else(m->body[m->link[worst].body].name, "a body");
+    fprintf(out,
+            "  note: '%.60s' takes %.3g N at %.3g s, %.2g times the weight; <force body=\"%.60s\" weight=\"1\"/> "
+            "softens that\n",
+            name, of[worst].most, of[worst].knot * timestep, of[worst].most / weight, name);
+  }
+  free(of);
+}
+
 // m/s that the last step may take away at an end at rest without that being told
 static const double braking = 0.1;
 
@@ -368,7 +425,7 @@ void cav_command_tell_leaning(FILE *out, const cav_problem *problem, const cav_t
         "  note: the guess flies (apex), the motion does not: it touches the world at every knot; heights of feet at "
         "a time make it leave the ground\n");
   if (forces) tell_toes(out, problem, motion, forces, weight), tell_ground(out, problem, motion, forces, weight);
-  if (forces) tell_hovering(out, problem, motion, forces, weight);
+  if (forces) tell_hovering(out, problem, motion, forces, weight), tell_blows(out, problem, forces, motion->timestep);
   cav_forces_free(forces);
   free(most), free(with);
 }
