@@ -38,7 +38,7 @@ enum { CURES = 3 };
 static const double force_weight = 1, off_weight = 1e4, self_weight = 1000, heavier = 10, harder = 4, lighter = 0.04,
                     softer = 6, longer = 2, closer = 2, soft = 0.03, slack = 0.75;
 
-/// Whether all that moves hangs on the world by joints of its own drives, as arms do, and no term asks for a touch: it leans
+/// Whether all that moves hangs on the world by actuated joints, as arms do, and no term asks for a touch: it leans
 /// on things only because that saves effort.
 static int only_hangs(const cav_problem *p) {
   const cav_model *m = p->model;
