@@ -620,6 +620,46 @@ static void test_reach(void) {
   }
 }
 
+// a finger that no actuator moves, and that the model has at the end of its range, is no hindrance
+static void test_reach_with_finger(void) {
+  static const char model[] =
+      "<mujoco><worldbody><body pos='0 0 .3'><joint name='a' axis='0 0 1'/><geom type='capsule' fromto='0 0 0 .3 0 0' "
+      "size='.03'/>"
+      "<body pos='.3 0 0'><joint name='b' axis='0 0 1'/><geom type='capsule' fromto='.06 0 0 .3 0 0' size='.03'/>"
+      "<body pos='.3 0 0'><joint name='c' axis='0 1 0'/><geom type='capsule' fromto='.06 0 0 .2 0 0' size='.02'/>"
+      "<site name='tip' pos='.22 0 0'/>"
+      "<body pos='.2 .03 0'><joint name='finger' type='slide' axis='0 1 0' range='0 .05' limited='true'/>"
+      "<geom size='.005' mass='.01' contype='0' conaffinity='0'/></body></body></body></body></worldbody>"
+      "<actuator><motor joint='a' ctrllimited='true' ctrlrange='-20 20'/><motor joint='b' ctrllimited='true' "
+      "ctrlrange='-20 20'/>"
+      "<motor joint='c' ctrllimited='true' ctrlrange='-20 20'/></actuator></mujoco>";
+  static const char problem[] =
+      "<problem name='finger' model='m.xml'><scene><geom name='post' type='cylinder' pos='.5 0 .3' size='.04 "
+      ".3'/></scene>"
+      "<horizon duration='2' timestep='0.02'/><start><joint name='a' degrees='-60'/></start><cost>"
+      "<sensor name='there' type='framepos' site='tip' target='.5 .4 .3' at='end' within='.1' weight='3000'/>"
+      "<velocity dofs='all' at='end' weight='100'/></cost></problem>";
+  char folder[] = "/tmp/cavort_finger_XXXXXX", path[100];
+  if (!CHECK(mkdtemp(folder) != NULL)) return;
+  scene_write(folder, "m.xml", model);
+  scene_write(folder, "p.xml", problem);
+  snprintf(path, sizeof path, "%s/p.xml", folder);
+  cav_error error = {0};
+  cav_problem *p = cav_problem_load(path, NULL, &error);
+  if (CHECK(p != NULL)) {
+    cav_strategy strategy[CAV_STRATEGIES];
+    int n;
+    CHECK(cav_strategy_list(p, strategy, &n) == CAV_OK && strategy[0].nreach == 3);
+    for (int k = 0; k < strategy[0].nreach; k++)
+      CHECK(strcmp(p->model->joint[strategy[0].reach[k].joint].name, "finger"));
+    cav_strategies_clear(strategy, n);
+  }
+  cav_problem_free(p);
+  unlink(path);
+  snprintf(path, sizeof path, "%s/m.xml", folder);
+  unlink(path), rmdir(folder);
+}
+
 int main(void) {
   test_through_ground();
   test_upright();
@@ -634,5 +674,6 @@ int main(void) {
   test_solids();
   test_detour();
   test_reach();
+  test_reach_with_finger();
   return check_result();
 }

@@ -110,6 +110,8 @@ static cav_status want_apart(reacher *r) {
 static cav_status search(reacher *r, double *q, int *good) {
   const cav_model *m = r->problem->model;
   cav_posture_search s = {.model = m, .nrow = r->nrow, .q = q, .rows = rows, .user = r};
+  // what is kept in its range by the search is not to be drawn back to a start that is not
+  cav_posture_clip(m, r->from);
   memcpy(q, r->from, (size_t)m->nq * sizeof *q);
   cav_status status = cav_posture_find(&s);
   // what may not move stays to the bit
@@ -155,7 +157,6 @@ static cav_status search_all(reacher *r, double *q, found_posture *kept, int *n)
       // the first one begins at the start itself
       if (k > 0) r->from[joint->q] += spread * (joint->type == CAV_JOINT_SLIDE ? 0.5 : 1) * even;
     }
-    cav_posture_clip(m, r->from);
     status = search(r, q, &good);
     if (good) keep(kept, n, distance(r, q), q, m->nq);
   }

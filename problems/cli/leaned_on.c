@@ -292,7 +292,7 @@ static void tell_hovering(FILE *out, const cav_problem *problem, const cav_traje
 }
 
 // times its weight from which on what one link of a tree takes of the world is told: runners take two to three on a foot
-static const double hard = 4;
+static const double hard = 3;
 
 /// What each link takes of the world at its worst, N, and when.
 typedef struct blow {
