@@ -68,6 +68,11 @@ static void show_progress(ticker *tick, const cav_progress *p) {
   int news = !tick->phase || strcmp(p->phase, tick->phase) || p->stage != tick->stage;
   if (!news && p->seconds - tick->last < (tick->terminal ? 0.1 : 1.0)) return;
   if (tick->terminal && tick->shown && news && p->seconds - tick->last < 0.05) return;
+  if (tick->phase && !strcmp(tick->phase, "continuation") && !strcmp(p->phase, "kinematics"))
+    fprintf(stderr,
+            "%sforces from the guess come no nearer: begun again, by the places and postures that are asked for alone "
+            "first\n",
+            tick->terminal ? "\n" : "");
   if (!tick->phase || strcmp(p->phase, tick->phase)) tick->begun = p->seconds;
   tick->phase = p->phase;
   tick->stage = p->stage;
