@@ -15,7 +15,7 @@
 #include "quantity.h"
 #include "transcription.h"
 
-enum { TRIES = 32, KEPT = 3, ROWS = 64 };
+enum { TRIES = 32, KEPT = 3 };
 static const double spread = 2; // rad, largest offset from the start that a search begins at; of slides half of it in m
 static const double clear = 0.02;    // m, from what is not nearer at the start
 static const double bending = 1e-3;  // rows per rad or m from where a search begins
@@ -41,11 +41,14 @@ typedef struct found_posture {
   double far, *q; // from the start; [nq]
 } found_posture;
 
+static int is_last(const cav_problem *p, const cav_term *term) {
+  return term->to < 0 || term->to >= p->duration - 0.5 * p->timestep;
+}
+
 // whether a term says what a posture has to be at the end
 static int is_of_end(const cav_problem *p, const cav_term *term) {
-  const int last = term->to < 0 || term->to >= p->duration - 0.5 * p->timestep;
-  return last && term->quantity == CAV_QUANTITY_SENSOR && term->use != CAV_USE_RANGE && cav_term_asks(term) &&
-         cav_term_stage(term) == CAV_READS_POSITION && isfinite(cav_term_tolerance(p, term, 1));
+  return is_last(p, term) && term->quantity == CAV_QUANTITY_SENSOR && term->use != CAV_USE_RANGE &&
+         cav_term_asks(term) && cav_term_stage(term) == CAV_READS_POSITION && isfinite(cav_term_tolerance(p, term, 1));
 }
 
 // rows of a term, of its tolerance; how many
@@ -213,14 +216,13 @@ static int prepare(reacher *r) {
   for (int i = 0; i < p->nterm; i++) {
     const cav_term *term = &p->term[i];
     if (is_of_end(p, term)) asked += term->component < 0 ? term->sensor.dim : 1;
-    const int last = term->to < 0 || term->to >= p->duration - 0.5 * p->timestep;
     // the start's posture once more
-    if (term->quantity == CAV_QUANTITY_CONFIGURATION && last && cav_term_asks(term) &&
+    if (term->quantity == CAV_QUANTITY_CONFIGURATION && is_last(p, term) && cav_term_asks(term) &&
         isfinite(cav_term_tolerance(p, term, 1)))
       return 0;
   }
   r->nrow = asked + 1 + p->model->nv;
-  return joints > 0 && asked > 0 && asked <= ROWS;
+  return joints > 0 && asked > 0;
 }
 
 cav_status cav_reach_find(const cav_problem *problem, cav_strategy *strategy) {

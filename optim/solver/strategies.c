@@ -162,10 +162,9 @@ static cav_status hold_over_ground(const cav_problem *problem, cav_strategy *beg
 typedef struct guesses {
   cav_strategy stated, plain, walk, fly; ///< straight from start to goal; with limbs swinging; by a flight
   cav_strategy detour, reach;            ///< round what the straight way runs into; to what terms of the end ask for
-
-  int collides, decorated, sinks; ///< what the stated guess does, and is
-  int pivots;                     ///< 1: it turns four feet or more on the spot, where they stand
-  int led;                        ///< 1: a file without a guess is begun with both hands led
+  int collides, decorated, sinks;        ///< what the stated guess does, and is
+  int pivots;                            ///< 1: it turns four feet or more on the spot, where they stand
+  int led;                               ///< 1: a file without a guess is begun with both hands led
 } guesses;
 
 /// With what no actuator moves kept upright. What tips is not mended by what else is missed, so this comes first where terms

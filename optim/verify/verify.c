@@ -292,9 +292,8 @@ static void decide(const cav_verification *verification, const metrics *found, c
   cav_metric slip = found->slip.most;
   slip.value = verdict->slip_mean_m_s;
   require(verdict, &slip, CAV_TOLERANCE_SLIP, "slip, m/s,",
-          "A lower softness or smoothing at the end of the schedule, or a higher weight of slip, usually helps; what "
-          "is meant to slide "
-          "is said by <slip body=\"NAME\" weight=\"0\" within=\"SPEED\"/>.");
+          "A lower softness or smoothing at the end of the schedule, or a higher weight of slip, usually helps; "
+          "what is meant to slide is said by <slip body=\"NAME\" weight=\"0\" within=\"SPEED\"/>.");
   require(
       verdict, &found->hover, CAV_TOLERANCE_HOVER, "contact force across gaps that stay open, fraction of all,",
       found->hover_self > 0.5
