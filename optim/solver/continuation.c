@@ -27,8 +27,9 @@ static const double round_tolerance = 1e-5, near = 1e-3;
 /// Unactuated force, fraction of the weight, at which a stage that stalls is the last.
 static const double hopeless = 2;
 
-/// Continuation: how often a stage that stalls is taken back.
+/// Continuation: how often a stage that stalls is taken back; rows that are no farther off where it stalls let it stand.
 enum { RETRIES = 3 };
+static const double stands = 0.03;
 
 /// Restoration: iterations of each of its two attempts.
 enum { RESTORATIONS = 30 };
@@ -146,6 +147,11 @@ static int is_hopeless(const cav_solve_run *run, double fraction, cav_outcome ou
          cav_transcription_unactuated(run->tr, NULL) > hopeless;
 }
 
+/// Whether a stage that stalls has done what it is for: its rows are nearly in, and the next law moves the jump that holds it.
+static int stage_stands(const cav_solve_run *run) {
+  return fmax(cav_transcription_unactuated(run->tr, NULL), cav_transcription_violation(run->tr)) < stands;
+}
+
 cav_status cav_stage_run(cav_solve_run *run, double fraction, cav_outcome *outcome) {
   cav_stage_options stage = cav_schedule_at(&run->problem->schedule, fraction);
   cav_stage_set(run->problem, fraction, run->tr);
@@ -209,7 +215,8 @@ cav_status cav_continuation_run(cav_solve_run *run) {
     begin = run->solution->iterations;
     status = keep(&before, run->at) ? cav_stage_run(run, fraction, &outcome) : CAV_NO_MEMORY;
     if (!before) break;
-    int again = outcome == CAV_OUTCOME_STALLED && retries < RETRIES && fraction > settled && fraction < 1;
+    int again =
+        outcome == CAV_OUTCOME_STALLED && retries < RETRIES && fraction > settled && fraction < 1 && !stage_stands(run);
     if (again) outcome = CAV_OUTCOME_AGAIN;
     if (!cav_run_note(run, fraction, begin, outcome)) status = CAV_NO_MEMORY;
     if (outcome == CAV_OUTCOME_AGAIN || outcome == CAV_OUTCOME_STALLED) run->region.radius = 0;
