@@ -367,6 +367,7 @@ typedef struct cav_problem {
   double *q_goal;      ///< [nq] goal posture of the guess and of configuration terms without a target
   cav_guess guess;     ///< what the guess is made from
   double guess_height; ///< m: ballistic arc added to the guess over guess_from .. guess_to
+  double guess_bow[2]; ///< m: half sine along x and y added to the first free joint's guess over guess_from .. guess_to
   double guess_from, guess_to; ///< s
   double
       guess_rotation[3]; ///< rotation vector that the first free joint's guess makes over guess_from .. guess_to, rad

@@ -363,6 +363,7 @@ typedef struct cav_strategy {
   int ground;                                 ///< 1: its guess stands on what is below it
   int hand;                      ///< hands that are brought first to what has to be pushed, carried or touched: 1 or 2
   double height, from, to;       ///< not stated: of a ballistic arc, m, and when, s
+  double bow[2];                 ///< not stated: cav_problem.guess_bow, over the whole way
   int flies;                     ///< 1: start and goal are held before and after that arc
   cav_guess_pose pose[2];        ///< where it flies
   cav_schedule schedule;         ///< schedule that it takes

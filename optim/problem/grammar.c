@@ -281,8 +281,9 @@ static const cav_xml_element guess = {
     ATTRIBUTES(
         WORD("type", cav_problem_guesses, "interpolate", "interpolate: from start to goal; hold: the start; pump: a swing-up found by simulation"),
         REAL("apex", 0, "m", "0", "height of a ballistic arc that is added between from and to"),
+        REALS("bow", 2, 2, "m", "0 0", "how far the first free joint goes round along x and y, by a half sine between from and to: round a post"),
         REALS("rotation", 3, 3, "degrees", "0 0 0", "rotation of the first free joint between from and to, as a rotation vector"),
-        TEXT("from", "0", "begin of the arc and the rotation, s or \"end\""), TEXT("to", "end", "end of them, s or \"end\""),
+        TEXT("from", "0", "begin of arc, bow and rotation, s or \"end\""), TEXT("to", "end", "end of them, s or \"end\""),
         FLAG("ground", "false", "each knot between start and goal is raised or lowered onto what is below it, so high as these: over ramps, steps and terrain"),
         TEXT("file", "(none)", "motion to follow: a trajectory.csv of the same model, such as ik and solve write; its first posture where the start is free, its last where there is no <goal>"),
         REAL("offset", 0, "s", "0", "time of that motion at which the guess begins")),

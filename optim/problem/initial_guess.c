@@ -149,7 +149,8 @@ cav_status cav_problem_initial_guess(const cav_problem_reader *reader) {
   double rotation[3] = {0};
   cav_xml_reals(node, "rotation", rotation, 3);
   for (int i = 0; i < 3; i++) p->guess_rotation[i] = rotation[i] * M_PI / 180;
-  int turned = rotation[0] != 0 || rotation[1] != 0 || rotation[2] != 0;
+  cav_xml_reals(node, "bow", p->guess_bow, 2);
+  int turned = rotation[0] != 0 || rotation[1] != 0 || rotation[2] != 0 || p->guess_bow[0] != 0 || p->guess_bow[1] != 0;
   cav_status status = read_guess_poses(reader, node);
   if (!status) status = read_guess_file(reader, node);
   if (!status) status = read_swings(reader, node);
@@ -160,7 +161,7 @@ cav_status cav_problem_initial_guess(const cav_problem_reader *reader) {
   if (p->guess_to < 0) p->guess_to = p->duration;
   if (p->guess_height == 0 && !turned && (cav_xml_get(node, "from") || cav_xml_get(node, "to"))) {
     return cav_xml_fail(reader->error, node, "apex",
-                        "expected a height above 0 for the arc, or a turn, between 'from' and 'to'");
+                        "expected a height above 0 for the arc, a bow or a turn, between 'from' and 'to'");
   }
   return CAV_OK;
 }

@@ -81,11 +81,11 @@ static int time_out_of_order(double last, int n, const double *time, size_t stri
 }
 
 static cav_status check_guess(const cav_problem *p, cav_error *error) {
-  const double number[6] = {p->guess_height,      p->guess_from,        p->guess_to,
-                            p->guess_rotation[0], p->guess_rotation[1], p->guess_rotation[2]};
-  if (infinite_entry(number, 6) >= 0)
+  const double number[8] = {p->guess_height,      p->guess_from,        p->guess_to,     p->guess_rotation[0],
+                            p->guess_rotation[1], p->guess_rotation[2], p->guess_bow[0], p->guess_bow[1]};
+  if (infinite_entry(number, 8) >= 0)
     return cav_file_fail(error, CAV_BAD_INPUT, 0,
-                         "guess_height, guess_from, guess_to and guess_rotation must be finite");
+                         "guess_height, guess_from, guess_to, guess_rotation and guess_bow must be finite");
   if ((p->nguess_pose && !p->guess_pose) || (p->nswing && !p->swing))
     return cav_file_fail(error, CAV_BAD_INPUT, 0, "guess_pose or swing is NULL, and counted");
   int late = time_out_of_order(p->duration, p->nguess_pose, p->nguess_pose ? &p->guess_pose->time : NULL,

@@ -294,12 +294,14 @@ static void write_guess(FILE *out, const cav_problem *p) {
   double rotation[3];
   for (int i = 0; i < 3; i++) rotation[i] = p->guess_rotation[i] * 180 / M_PI;
   int turned = rotation[0] != 0 || rotation[1] != 0 || rotation[2] != 0;
+  int bowed = p->guess_bow[0] != 0 || p->guess_bow[1] != 0;
   fputs("  <guess", out);
   write_text(out, "type", cav_problem_guesses[p->guess]);
   if (p->guess_height > 0) write_number(out, "apex", p->guess_height);
   if (p->guess_ground) write_text(out, "ground", "true");
   if (turned) write_numbers(out, "rotation", rotation, 3);
-  if (turned || p->guess_height > 0) {
+  if (bowed) write_numbers(out, "bow", p->guess_bow, 2);
+  if (turned || bowed || p->guess_height > 0) {
     write_number(out, "from", p->guess_from);
     write_number(out, "to", p->guess_to);
   }

@@ -1,6 +1,6 @@
 /// Guesses lifted out of what stands in the world: where the line from start to goal goes through a solid there is no way
 /// to the outside that a solver could follow. At each knot the least lift straight up that frees the model; then so smooth a
-/// course above these that no step is taken in less than half a second.
+/// course above these that no step is taken in less than half a second. What is a little in what hangs over it stays below.
 #include "clear.h"
 
 #include <math.h>
@@ -9,6 +9,7 @@
 
 #include "continuation.h"
 #include "math3.h"
+#include "role.h"
 
 /// Depth that is free, m; least step upwards of the search, and how many of them.
 static const double touching = 1e-3, step = 0.01;
@@ -24,6 +25,10 @@ static const double deep = 0.01;
 
 /// Depth in the ground of a guess that goes through it, over the size of the model.
 static const double buried = 0.5;
+
+/// How far a guess that is under what hangs has to go down to be clear of it, over how far up, and at most, m; how high the foot
+/// of what hangs is over the lowest point of the guess, m.
+static const double under = 0.25, under_most = 0.1, hanging = 0.05;
 
 /// Time over which the course looks ahead and back, s.
 static const double ahead = 0.25;
@@ -48,8 +53,7 @@ static void lift(const cav_model *m, int tree, double height, double *q) {
 
 void cav_lift(const cav_model *m, double height, double *q) { lift(m, 0, height, q); }
 
-/// Whether a contact is with a solid of the world, of which grounds are none.
-static int is_with_solid(const cav_model *m, const cav_contact *c) {
+int cav_is_with_solid(const cav_model *m, const cav_contact *c) {
   if (c->link1 > 0 && c->link2 > 0) return 0;
   const cav_pair *pair = &m->pair[c->pair];
   const cav_geom_type type = m->geom[c->link1 == 0 ? pair->geom1 : pair->geom2].type;
@@ -62,8 +66,53 @@ static cav_status depth_at(const cav_model *m, cav_state *state, const double *q
   *depth = 0;
   for (int i = 0; i < state->ncontact && !status; i++) {
     const cav_contact *c = &state->contact[i];
-    if (solids ? is_with_solid(m, c) : c->link1 == 0 || c->link2 == 0) *depth = fmax(*depth, -c->dist);
+    if (solids ? cav_is_with_solid(m, c) : c->link1 == 0 || c->link2 == 0) *depth = fmax(*depth, -c->dist);
   }
+  return status;
+}
+
+/// Lowest point of what moves at the last position.
+static double lowest_point(const cav_model *m, const cav_state *state) {
+  static const double down[3] = {0, 0, -1};
+  double lowest = INFINITY;
+  for (int g = 0; g < m->ngeom; g++) {
+    cav_pose pose;
+    if (m->geom[g].link == 0 || !(m->geom[g].contype || m->geom[g].conaffinity)) continue;
+    cav_object_pose(m, state, CAV_OBJECT_GEOM, g, &pose);
+    lowest = fmin(lowest, pose.pos[2] - cav_geom_reach(&m->geom[g], &pose, down));
+  }
+  return lowest;
+}
+
+/// Whether all solids that a model is in at a configuration hang over its lowest point.
+static cav_status is_hung_over(const cav_model *m, cav_state *state, const double *q, int *hung) {
+  static const double down[3] = {0, 0, -1};
+  cav_status status = cav_position(m, state, q);
+  const double lowest = status ? 0 : lowest_point(m, state);
+  *hung = 1;
+  for (int i = 0; i < state->ncontact && !status; i++) {
+    const cav_contact *c = &state->contact[i];
+    if (c->dist >= -touching || !(c->link1 == 0 || c->link2 == 0)) continue;
+    const int g = c->link1 == 0 ? m->pair[c->pair].geom1 : m->pair[c->pair].geom2;
+    cav_pose pose;
+    cav_object_pose(m, state, CAV_OBJECT_GEOM, g, &pose);
+    const double foot = pose.pos[2] - cav_geom_reach(&m->geom[g], &pose, down);
+    *hung &= cav_is_with_solid(m, c) && foot > lowest + hanging;
+  }
+  return status;
+}
+
+/// Whether a model that a lift frees of solids is under what it is in, and would be free a little lower.
+static cav_status is_under(const cav_model *m, cav_state *state, double *q, double up, int *is) {
+  double depth = 1, down = 0;
+  const double most = fmin(under * up, under_most);
+  cav_status status = is_hung_over(m, state, q, is);
+  while (!status && *is && depth > touching && down < most) {
+    cav_lift(m, -step, q), down += step;
+    status = depth_at(m, state, q, 1, &depth);
+  }
+  cav_lift(m, down, q);
+  *is = *is && depth <= touching;
   return status;
 }
 
@@ -81,6 +130,12 @@ cav_status cav_clear(const cav_model *m, cav_trajectory *at) {
       cav_lift(m, up, q);
       lift[t] += up;
     }
+    int stays = 0;
+    if (lift[t] == 0 || status) continue;
+    cav_lift(m, -lift[t], q);
+    status = is_under(m, state, q, lift[t], &stays);
+    cav_lift(m, stays ? 0 : lift[t], q);
+    if (stays) lift[t] = 0;
   }
   for (int t = 0; t < n && !status; t++)
     for (int k = -w; k <= w; k++)
@@ -172,7 +227,7 @@ cav_status cav_stands_on_solid(const cav_problem *problem, int *stands) {
     status = cav_position(m, state, ends[k]);
     for (int i = 0; i < state->ncontact && !status; i++) {
       const cav_contact *c = &state->contact[i];
-      *stands |= c->dist < deep && is_with_solid(m, c);
+      *stands |= c->dist < deep && cav_is_with_solid(m, c);
     }
   }
   cav_state_free(state);

@@ -7,6 +7,9 @@
 /// Raises the roots that can rise.
 void cav_lift(const cav_model *m, double height, double *q);
 
+/// Whether a contact is with a solid of the world, of which grounds are none.
+int cav_is_with_solid(const cav_model *model, const cav_contact *contact);
+
 /// Lifts the knots of a guess out of the world, but the first.
 cav_status cav_clear(const cav_model *model, cav_trajectory *guess);
 

@@ -1,7 +1,7 @@
 /// Guesses: the trajectory that a solve starts from.
 ///
 /// From start to goal along the geodesic of the configuration space with a cubic of time; or by postures on the way,
-/// linear in time between them; or the start held. On that a rotation of the first free joint, a ballistic arc of the
+/// linear in time between them; or the start held. On that a rotation and a bow of the first free joint, a ballistic arc of the
 /// roots, and sines laid over single joints. Cycles go from their start to where that is a period on, at constant
 /// speed. Wheels on the ground roll along. Asks nothing else of contacts or forces. A swing-up is simulated (pump.c).
 #include <math.h>
@@ -45,6 +45,14 @@ static void rotation(const cav_problem *problem, double fraction, double *q) {
     memcpy(quat, r, sizeof r);
     return;
   }
+}
+
+/// Moves the first free joint aside by a fraction of the guess's bow.
+static void bow(const cav_problem *problem, double fraction, double *q) {
+  const cav_model *m = problem->model;
+  int j = 0;
+  while (j < m->njoint && m->joint[j].type != CAV_JOINT_FREE) j++;
+  for (int k = 0; k < 2 && j < m->njoint; k++) q[m->joint[j].q + k] += fraction * problem->guess_bow[k];
 }
 
 /// Lays the swings over q, within the joints' ranges: a knee swings one way only.
@@ -133,6 +141,7 @@ cav_status cav_guess_fill(const cav_problem *problem, const double *end, cav_tra
     if (problem->guess != CAV_GUESS_PUMP) follow(problem, end, time, tangent, q);
     swing(problem, time, q);
     rotation(problem, smoothstep(x), q);
+    if (x > 0 && x < 1) bow(problem, sin(M_PI * x), q);
     if (x > 0 && x < 1) cav_lift(m, 4 * problem->guess_height * x * (1 - x), q);
   }
   if (!problem->cycle.on && problem->guess != CAV_GUESS_PUMP) status = roll(problem, at);

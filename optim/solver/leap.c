@@ -52,7 +52,8 @@ cav_status cav_leap_find(const cav_problem *problem, double *height, double *fro
   double time = 0, g = norm3(problem->model->gravity), rise;
   *height = *from = *to = 0;
   if (problem->cycle.on || g == 0 || !can_rise(problem->model)) return CAV_OK;
-  straight.guess = CAV_GUESS_INTERPOLATE, straight.guess_height = 0, straight.nguess_pose = straight.nswing = 0;
+  straight.guess = CAV_GUESS_INTERPOLATE, straight.guess_height = straight.guess_bow[0] = straight.guess_bow[1] = 0,
+  straight.nguess_pose = straight.nswing = 0;
   zero3(straight.guess_rotation);
   cav_trajectory *way = cav_problem_guess(&straight, NULL);
   cav_state *state = cav_state_new(problem->model);
@@ -94,6 +95,7 @@ void cav_flight_apply(double height, double from, double to, cav_guess_pose pose
   taken->guess = CAV_GUESS_INTERPOLATE;
   taken->guess_height = height, taken->guess_from = from, taken->guess_to = to;
   zero3(taken->guess_rotation);
+  taken->guess_bow[0] = taken->guess_bow[1] = 0;
   taken->nguess_pose = 2, taken->guess_pose = pose;
   taken->nswing = 0;
 }

@@ -7,6 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "bypass.h"
 #include "carry.h"
 #include "clear.h"
 #include "continuation.h"
@@ -84,9 +85,10 @@ static int is_recorded(const cav_problem *problem) {
   return 0;
 }
 
-/// Whether a problem has postures, an arc, a turn or swings on the way of its guess.
+/// Whether a problem has postures, an arc, a bow, a turn or swings on the way of its guess.
 static int is_decorated(const cav_problem *problem) {
-  int decorated = problem->guess_height != 0 || problem->nguess_pose || problem->nswing;
+  int decorated = problem->guess_bow[0] != 0 || problem->guess_bow[1] != 0 || problem->guess_height != 0 ||
+                  problem->nguess_pose || problem->nswing;
   for (int k = 0; k < 3; k++) decorated |= problem->guess_rotation[k] != 0;
   return decorated;
 }
@@ -162,6 +164,7 @@ static cav_status hold_over_ground(const cav_problem *problem, cav_strategy *beg
 typedef struct guesses {
   cav_strategy stated, plain, walk, fly; ///< straight from start to goal; with limbs swinging; by a flight
   cav_strategy detour, reach;            ///< round what the straight way runs into; to what terms of the end ask for
+  cav_strategy bypass;                   ///< round what it runs into, on the ground
   int collides, decorated, sinks;        ///< what the stated guess does, and is
   int pivots;                            ///< 1: it turns four feet or more on the spot, where they stand
   int led;                               ///< 1: a file without a guess is begun with both hands led
@@ -323,6 +326,12 @@ static cav_status find_guesses(const cav_problem *problem, const cav_strategy *s
   g->detour.schedule.solids = problem->schedule.solids;
   if (status == CAV_OK && g->collides && !g->decorated && problem->guess == CAV_GUESS_INTERPOLATE)
     status = cav_detour_find(problem, &g->detour);
+  g->bypass = g->detour;
+  g->bypass.nswing = g->walk.nswing;
+  memcpy(g->bypass.swing, g->walk.swing, sizeof g->walk.swing);
+  g->bypass.text = "round what stands in the straight way, on the ground";
+  if (status == CAV_OK && g->collides && !g->decorated && problem->guess == CAV_GUESS_INTERPOLATE)
+    status = cav_bypass_find(problem, &g->bypass);
   // where the goal is the start, what is asked for at the end is where the way goes
   const int reaches =
       !problem->cycle.on && !g->decorated && problem->guess == CAV_GUESS_INTERPOLATE && is_back(problem);
@@ -351,9 +360,11 @@ static void add_plain(const cav_problem *problem, cav_strategy *strategy, int *n
 static cav_status add_others(const cav_problem *problem, cav_strategy *strategy, int *n, const guesses *g) {
   // a file without a guess is begun so
   if (g->detour.nswing) begin_with(strategy, &g->detour);
+  const int round = g->bypass.bow[0] != 0 || g->bypass.bow[1] != 0;
   if (g->reach.nreach) begin_with(strategy, &g->reach);
   if (g->collides) add_grown(problem, strategy, n, &g->stated, &g->walk, &g->fly);
   if (!g->collides && g->fly.height > 0 && problem->guess_height > 0) add_mended(strategy, n, &g->fly, "flight");
+  if (round) begin_with(strategy, &g->bypass);
   if (g->pivots) begin_with(strategy, &g->walk);
   if (g->walk.nswing && !g->collides && !g->pivots) add_mended(strategy, n, &g->walk, "swing");
   cav_strategy soft = g->stated;
@@ -448,6 +459,9 @@ void cav_strategy_apply(const cav_problem *problem, const cav_strategy *strategy
   taken->guess_height = strategy->height;
   taken->guess_ground = strategy->ground;
   if (strategy->height > 0) taken->guess_from = strategy->from, taken->guess_to = strategy->to;
+  memcpy(taken->guess_bow, strategy->bow, sizeof taken->guess_bow);
+  const int bowed = strategy->bow[0] != 0 || strategy->bow[1] != 0;
+  if (bowed) taken->guess_from = 0, taken->guess_to = problem->duration;
   memset(taken->guess_rotation, 0, sizeof taken->guess_rotation);
   taken->nguess_pose = 0;
   taken->nswing = strategy->nswing;

@@ -98,6 +98,7 @@ static cav_status make_part(windows *w, cav_track *track) {
   part->guess_height = part->guess_ground = 0;
   part->guess_from = 0, part->guess_to = part->duration;
   memset(part->guess_rotation, 0, sizeof part->guess_rotation);
+  memset(part->guess_bow, 0, sizeof part->guess_bow);
   part->q_start = w->at->q + (size_t)w->first * (size_t)m->nq;
   part->v_start = w->at->v + (size_t)w->first * (size_t)m->nv;
   part->term = malloc(((size_t)p->nterm + 1) * sizeof *part->term);

@@ -609,6 +609,8 @@ static cav_status print_problem(const cav_problem *p, int all, cav_error *error)
                                       : "goes from start to goal");
   if (p->nguess_pose > 0) printf(" by %d postures", p->nguess_pose);
   if (p->guess_height > 0) printf(", with an arc of %g m from %g to %g s", p->guess_height, p->guess_from, p->guess_to);
+  if (p->guess_bow[0] != 0 || p->guess_bow[1] != 0)
+    printf(", with a bow of %g %g m from %g to %g s", p->guess_bow[0], p->guess_bow[1], p->guess_from, p->guess_to);
   printf("\n");
   if (all && (status = print_equations(p, error))) return status;
   printf("  actuators up to %g of their limits, joints and tendons %g rad or m inside theirs\n", p->effort_limit,
