@@ -55,8 +55,10 @@ typedef struct cav_progress {
 /// CAV_INTERRUPTED and the best iterate.
 typedef int (*cav_observer)(void *context, const cav_progress *progress);
 
-/// Asked many times an iteration, by the thread that solves; nonzero ends the solve as an observer does.
+/// Asked many times an iteration, by the thread that solves; nonzero ends the solve as an observer does: at once, or after
+/// a motion whose rows hold has got feedback gains, of a few sets (seconds), while it is asked for the end at once.
 typedef int (*cav_stop)(void *context);
+enum { CAV_STOP_NOW = 1, CAV_STOP_SOON = 2 };
 
 /// Places of a solve between two of its parts, X(place, word in files, what comes next). A solve goes through them in
 /// this order; only where rows do not come in does it come to those after the first programme.
@@ -133,7 +135,7 @@ typedef struct cav_solve_options {
   int first_stage; ///< of the schedule, from 1 (0 is 1); more than it has stages: straight to the optimum, from a start
                    ///< that is near it. Of the own solver
   int max_iterations;       ///< of this call; 0: no limit. It ends as if it were interrupted
-  double max_seconds;       ///< of this call before gains are chosen, wall clock; 0: no limit
+  double max_seconds;       ///< of this call before gains are chosen, wall clock: CAV_STOP_SOON; 0: no limit
   int gains;                ///< 1: feedback gains are chosen, where the motion may be certified with them
   int nmultiplier;          ///< 0, or number of rows: cav_solution's of a solve of the same knots and rows
   const double *multiplier; ///< [nmultiplier] to start with, NULL: zeros

@@ -76,10 +76,21 @@ static double done(const cav_solve_run *run) {
 }
 
 int cav_run_stop(void *context) {
-  const cav_solve_run *run = context;
+  cav_solve_run *run = context;
   const cav_solve_options *o = run->options;
-  int refused = run->tr && run->tr->failure.status == CAV_BAD_INPUT;
-  return refused || (o->stop && o->stop(o->stop_context)) || cav_clock() >= run->deadline;
+  const int refused = run->tr && run->tr->failure.status == CAV_BAD_INPUT;
+  const int asked = o->stop ? o->stop(o->stop_context) : 0;
+  run->soon |= asked == CAV_STOP_SOON || cav_clock() >= run->deadline;
+  run->at_once |= asked != 0 && asked != CAV_STOP_SOON;
+  return refused || run->at_once || (run->soon && !run->ending);
+}
+
+/// Whether the observer asks for the end.
+static int observed(cav_solve_run *run, const cav_progress *line) {
+  const cav_solve_options *o = run->options;
+  const int asked = o->observer && o->observer(o->observer_context, line);
+  run->at_once |= asked;
+  return asked;
 }
 
 int cav_run_report(void *context, double step, double radius) {
@@ -97,7 +108,7 @@ int cav_run_report(void *context, double step, double radius) {
     run->failed = CAV_NO_MEMORY;
     return 1;
   }
-  if (run->options->observer && run->options->observer(run->options->observer_context, &line)) return 1;
+  if (observed(run, &line)) return 1;
   int most = run->options->max_iterations;
   return (most > 0 && solution->iterations - run->begin >= most) || cav_run_stop(run);
 }
@@ -111,7 +122,7 @@ int cav_run_feedback(void *context, int trial, int trials) {
   line.seconds = cav_clock() - run->start;
   const double *p = part[CAV_PLACE_FEEDBACK];
   line.fraction = p[0] + (p[1] - p[0]) * (trial - 1) / trials;
-  return (run->options->observer && run->options->observer(run->options->observer_context, &line)) || cav_run_stop(run);
+  return observed(run, &line) || cav_run_stop(run);
 }
 
 int cav_run_note(cav_solve_run *run, double fraction, int begin, cav_outcome outcome) {

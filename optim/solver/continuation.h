@@ -28,6 +28,8 @@ typedef struct cav_solve_run {
   double start;                 ///< s
   double noted;                 ///< s, when the last stage ended
   double deadline;              ///< s, infinite: none
+  int soon, at_once;            ///< the end was asked for, or the deadline came; it was asked for at once
+  int ending;                   ///< 1: it ends soon, and is asked for the end at once alone
   int begin;                    ///< iterations before this call
   const cav_checkpoint *resume; ///< where it goes on, until it has come there; NULL: it has
   int quiet;                    ///< 1: no log and no records of stages are kept

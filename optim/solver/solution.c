@@ -104,17 +104,20 @@ static cav_status find_rows(cav_solve_run *run) {
   return cav_transcription_rows(run->tr, allowed, &run->solution->row, &run->solution->nrow);
 }
 
+/// Sets of gains that are tried of a motion that ends soon.
+enum { LAST_SETS = 8 };
+
 /// Gains, of what may be certified with them.
-static cav_status find_gains(cav_solve_run *run, cav_error *error) {
+static cav_status find_gains(cav_solve_run *run, int interrupted, cav_error *error) {
   if (!run->options->gains || !cav_run_certifiable(run) || !cav_run_within_limits(run)) return CAV_OK;
   run->phase = "feedback";
   run->stage = run->stages = 1;
   // a motion whose rows do not quite hold is not worth more than one set
-  int sets = cav_run_met(run) ? 0 : 1;
+  int sets = interrupted ? LAST_SETS : cav_run_met(run) ? 0 : 1;
   return cav_choose_gains(run->problem, run->tr, run->at, sets, cav_run_feedback, run, run->solution, error);
 }
 
-/// What the solution says of its last iterate, and its gains unless it was interrupted.
+/// What the solution says of its last iterate, and its gains unless it was interrupted and ends at once.
 static cav_status conclude(cav_solve_run *run, int interrupted, cav_error *error) {
   if (!cav_transcription_keep_rows(run->tr)) return CAV_NO_MEMORY;
   cav_status status = cav_transcription_linearise(run->tr, run->at);
@@ -129,7 +132,7 @@ static cav_status conclude(cav_solve_run *run, int interrupted, cav_error *error
   if (status != CAV_OK) return status;
   run->solution->multiplier = cav_run_multipliers(run, 1, &run->solution->nmultiplier);
   if (!run->solution->multiplier) return CAV_NO_MEMORY;
-  return interrupted ? CAV_OK : find_gains(run, error);
+  return interrupted && !run->ending ? CAV_OK : find_gains(run, interrupted, error);
 }
 
 cav_status cav_run_solve(cav_solve_run *run, cav_error *error) {
@@ -157,9 +160,10 @@ cav_status cav_run_refused(const cav_solve_run *run, cav_status status, cav_erro
   return own->status;
 }
 
-/// Nobody is asked any more: the iterate that stands is told of, whoever asked for the end.
+/// The iterate that stands is told of, whoever asked for the end; where that is soon, it is asked for the end at once alone.
 static void end_anyhow(cav_solve_run *run) {
-  run->tr->stop = NULL;
+  run->ending = run->soon && !run->at_once && run->tr->failure.status == CAV_OK;
+  if (!run->ending) run->tr->stop = NULL;
   if (run->tr->failure.status == CAV_BAD_INPUT) run->refusal = run->tr->failure;
   run->tr->failure = (cav_error){0};
 }
@@ -177,10 +181,13 @@ static cav_status solve_and_conclude(cav_solve_run *run, cav_status *end, cav_er
   // the reason of the solve goes before what verification of the gains says
   cav_error inner = {0};
   *end = conclude(run, status == CAV_INTERRUPTED, &inner);
-  if (*end == CAV_INTERRUPTED) {
+  while (*end == CAV_INTERRUPTED) {
     status = CAV_INTERRUPTED;
     end_anyhow(run);
-    *end = run->solution->multiplier ? CAV_OK : conclude(run, 1, &inner);
+    const int gains = run->solution->gain_q != NULL;
+    *end = !run->solution->multiplier ? conclude(run, 1, &inner)
+           : run->ending && !gains    ? find_gains(run, 1, &inner)
+                                      : CAV_OK;
   }
   if (*end != CAV_OK && status == CAV_OK && error) *error = inner;
   return status;

@@ -616,6 +616,16 @@ static cav_status hold(const cav_solve_run *run, descent *d) {
   return d->held ? CAV_OK : CAV_NO_MEMORY;
 }
 
+/// Of a run that is stopped the last motion whose rows held; where there is time, the last one, if its rows can be brought in.
+static cav_status leave(cav_solve_run *run, descent *d) {
+  run->ending = run->soon && !run->at_once;
+  if (run->ending && cav_quadratic_length(d->qp) > 0 && cav_transcription_values(run->tr, run->at) == CAV_OK &&
+      settle_rows(run, d) == CAV_OK && hold(run, d) == CAV_NO_MEMORY)
+    return CAV_NO_MEMORY;
+  if (d->held && d->holds) cav_run_exchange(&run->at, &d->held);
+  return CAV_INTERRUPTED;
+}
+
 /// Where a run ends beside its rows: back to where they held, if that costs little, and by the metric of there.
 static cav_status go_back(cav_solve_run *run, descent *d) {
   double most = (1 + held_loss) * cav_transcription_cost(run->tr), saving;
@@ -724,8 +734,7 @@ static cav_status run_of(cav_solve_run *run, int *left, double asked, double fra
   if (status == CAV_OK && cav_run_certifiable(run)) status = hold(run, &d);
   run->measured = 0;
   if (status == CAV_OK) status = descend(run, &d, left, &settled);
-  // of a run that is stopped the last motion whose rows held
-  if (status == CAV_INTERRUPTED && d.held && d.holds && !soft) cav_run_exchange(&run->at, &d.held);
+  if (status == CAV_INTERRUPTED && !soft) status = leave(run, &d);
   run->tr->penalty = kept;
   if (status == CAV_OK) status = cav_transcription_values(run->tr, run->at);
   int met = status == CAV_OK && cav_run_met(run);

@@ -26,8 +26,8 @@ static volatile sig_atomic_t interrupted, first_second;
 static void interrupt(int signal_number) {
   struct timespec now;
   clock_gettime(CLOCK_MONOTONIC, &now);
-  if (!interrupted) {
-    interrupted = 1;
+  if (interrupted != CAV_STOP_NOW) {
+    interrupted = CAV_STOP_NOW;
     first_second = (sig_atomic_t)now.tv_sec;
   } else if (now.tv_sec > first_second + 1) {
     signal(signal_number, SIG_DFL);
@@ -35,9 +35,10 @@ static void interrupt(int signal_number) {
   }
 }
 
-// asks for the end, and never for more than that
+// asks for the end soon, and never for more than that
 static void time_is_up(int signal_number) {
-  if (!interrupted) interrupt(signal_number);
+  (void)signal_number;
+  if (!interrupted) interrupted = CAV_STOP_SOON;
 }
 
 // seconds: after which it is as if someone had asked for the end, 0: never
@@ -97,7 +98,7 @@ static void show_progress(ticker *tick, const cav_progress *p) {
 static int observe(void *context, const cav_progress *progress) {
   ticker *tick = context;
   if (!tick->quiet) show_progress(tick, progress);
-  return interrupted;
+  return interrupted == CAV_STOP_NOW;
 }
 
 // refuses a folder whose problem.xml is the problem file itself, which would be overwritten
@@ -204,9 +205,12 @@ static int save(void *context, const cav_problem *problem, const cav_solution *s
   cav_error error = {0};
   // it may also have been stopped while other strategies were tried, and this one was verified before
   int stopped = report->status == CAV_INTERRUPTED, ended = stopped || (report->stopped && !cav_race_success(report));
-  if (ended)
-    fprintf(stderr, "cavort: %s; the best iterate is saved, the same command with --resume goes on\n",
-            stopped ? verdict->reason : "stopped while other strategies were tried");
+  if (ended || *report->where)
+    fprintf(stderr, "cavort: %s; the best iterate is %s, the same command with --resume goes on\n",
+            stopped          ? verdict->reason
+            : *report->where ? report->where
+                             : "stopped while other strategies were tried",
+            stopped || !*report->where ? "saved" : "verified as it is");
   else if (report->status)
     fprintf(stderr, "cavort: %s\n", report->text[0] ? report->text : why_stopped(report->status));
   cav_provenance provenance = *to->provenance;

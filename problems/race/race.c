@@ -78,7 +78,8 @@ static int is_over(const cav_race *race) {
 // by a signal, because the time is over, or because the process that this one works for is no more
 static int asks_for_the_end(void *context) {
   const cav_race *race = context;
-  return is_over(race) || (race->parent && getppid() != race->parent);
+  if (*race->interrupted == CAV_STOP_NOW || (race->parent && getppid() != race->parent)) return CAV_STOP_NOW;
+  return is_over(race) ? CAV_STOP_SOON : 0;
 }
 
 // where checkpoints of a strategy go
@@ -278,10 +279,14 @@ static cav_solution *run(const cav_race *race, int i, const cav_solve_options *o
     leave_unverified(solution, &report->verdict);
     report->cost = solution->cost;
     report->solution = 1;
-  } else if (solution && counts(status)) {
+  }
+  // what has gains was given the time for them, and for what they are worth
+  const int in_time = solution && status == CAV_INTERRUPTED && solution->gain_q;
+  if (in_time) say_where(solution, report->where, sizeof report->where);
+  if (solution && counts(status) && (status != CAV_INTERRUPTED || in_time)) {
     tell_verification(options, solution);
     cav_status verified = cav_race_verify(taken, solution, report, &verification);
-    if (verified != CAV_OK) status = verified, error = verification;
+    if (verified != CAV_OK || in_time) status = verified, error = verification;
   }
   report->status = (int)status;
   snprintf(report->text, sizeof report->text, "%.399s", error.text);
@@ -606,9 +611,10 @@ static void listen_to(cav_race *race, int *passed_on) {
     if (race->entry[i].state == CAV_RACE_RUNNING)
       of[n] = i, wait[n++] = (struct pollfd){race->entry[i].answer, POLLIN, 0};
   int ready = poll(wait, (nfds_t)n, 200);
-  if (*race->interrupted && !*passed_on) {
-    for (int k = 0; k < n; k++) kill(race->entry[of[k]].child, SIGINT);
-    *passed_on = 1;
+  const int asked = *race->interrupted;
+  if (asked && *passed_on != asked) {
+    for (int k = 0; k < n; k++) kill(race->entry[of[k]].child, asked == CAV_STOP_SOON ? SIGALRM : SIGINT);
+    *passed_on = asked;
   }
   for (int k = 0; k < n && ready > 0; k++) {
     cav_race_entry *e = &race->entry[of[k]];

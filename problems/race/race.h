@@ -16,6 +16,7 @@ typedef struct cav_race_report {
   double cost;
   double seconds;                     ///< of the processor, of a process of its own
   char text[400];                     ///< what the solver said
+  char where[80];                     ///< where it was stopped, of one that was verified all the same
   char changed[CAV_STRATEGY_CHANGES]; ///< in the problem, by a repair
 } cav_race_report;
 
@@ -48,7 +49,7 @@ typedef struct cav_race {
   const char *key;                    ///< that they get
   int resume;                         ///< 1: strategies go on from those that are there
   pid_t parent;                       ///< in a child: whose it is; 0: no child
-  volatile sig_atomic_t *interrupted; ///< nonzero: start nothing more
+  volatile sig_atomic_t *interrupted; ///< nonzero: start nothing more; CAV_STOP_NOW, CAV_STOP_SOON: what runs ends so
   int processes;                      ///< at most
   double most_seconds; ///< that all processes may take together, by their own clocks, one at a time; 0: any
   int tell;            ///< 1: lines on standard error about what starts and ends
