@@ -208,6 +208,10 @@ const cav_contact *cav_command_deepest(const cav_state *state);
 /// something, a line each; their number. postures.c.
 int cav_command_tell_postures(FILE *out, const cav_problem *problem);
 
+/// Says of a body that floats and has to be farther in a time than pushing off the ground brings it, and of a thing to slide that
+/// is too heavy for what stands there; their number. demands.c.
+int cav_command_tell_demands(FILE *out, const cav_problem *problem);
+
 /// Says of a <goal> that no term asks for where a term wants another reading at the end; their number. postures.c.
 int cav_command_tell_goal(FILE *out, const cav_problem *problem);
 

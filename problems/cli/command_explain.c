@@ -43,7 +43,8 @@ static void print_brief(const cav_explanation *e, const cav_verdict *verdict, co
   int known = impossible || *pumping || apart;
   if (!known && *missed) n += printf("cause: %s\n", missed) > 0, known = 1;
   if (e->met || known) {
-    for (int i = 0; i < e->nconflict && n < LINES && !known; i++, n++) print_cause(&e->conflict[i], "  ");
+    for (int i = 0; i < e->nconflict && n < LINES && !known; i++, n++)
+      print_cause(&e->conflict[i], good ? "  " : "what the cost hangs on: ");
   } else if (n < LINES && e->nconflict) {
     print_cause(&e->conflict[0], "cause: "), n++;
   } else if (n < LINES && e->nviolation) {
@@ -223,7 +224,7 @@ int cav_command_explain(const cav_command_line *line) {
   int stopped = !status && cav_command_tell_stopped(line->json ? NULL : stdout, line->operand);
   if (!status && !line->json && !verdict.certified) cav_command_tell_equalities(stdout, result->problem);
   if (!status && !line->json && !(verdict.certified && verdict.achieved))
-    cav_command_tell_postures(stdout, result->problem);
+    cav_command_tell_postures(stdout, result->problem), cav_command_tell_demands(stdout, result->problem);
   if (!status && line->json) {
     printf("{\n  \"stopped\": %s,\n", stopped ? "true" : "false");
     printf(

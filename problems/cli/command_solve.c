@@ -322,6 +322,7 @@ static int solve_from(const cav_command_line *line, const cav_problem *problem, 
   if (!status && race.tell) cav_command_tell_units(stderr, problem);
   if (!status && race.tell) cav_command_tell_equalities(stderr, problem);
   if (!status && race.tell) cav_command_tell_postures(stderr, problem);
+  if (!status && race.tell) cav_command_tell_demands(stderr, problem);
   if (!status && race.tell) cav_command_tell_axes(stderr, problem);
   if (!status && race.tell) cav_command_tell_guess(stderr, problem, 0);
   const cav_strategy *first = &race.entry[0].strategy;

@@ -580,6 +580,7 @@ static cav_status print_problem(const cav_problem *p, int all, cav_error *error)
   cav_command_tell_units(stdout, p);
   cav_command_tell_equalities(stdout, p);
   cav_command_tell_postures(stdout, p);
+  cav_command_tell_demands(stdout, p);
   cav_command_tell_goal(stdout, p);
   cav_command_tell_axes(stdout, p);
   cav_command_tell_guess(stdout, p, 1);

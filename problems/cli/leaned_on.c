@@ -317,6 +317,15 @@ static int has_force_cost(const cav_problem *problem, int link) {
   return 0;
 }
 
+/// Whether nothing holds a tree up but what it stands on: it floats, or slides up and down by no actuator.
+static int falls(const cav_model *m, int root) {
+  const cav_link *link = &m->link[root];
+  int slides = 0;
+  for (int j = link->joint; j < link->joint + link->njoint; j++)
+    slides |= m->joint[j].type == CAV_JOINT_SLIDE && !m->joint[j].driven && fabs(m->joint[j].axis[2]) > 0.9;
+  return cav_command_floats(m, root) || (link->parent == 0 && slides);
+}
+
 /// Links that take many weights of their tree at once, as one foot that lands stiff, unless their forces cost.
 static void tell_blows(FILE *out, const cav_problem *problem, const cav_forces *forces, double timestep) {
   const cav_model *m = problem->model;
@@ -331,7 +340,7 @@ static void tell_blows(FILE *out, const cav_problem *problem, const cav_forces *
   if (of && forces->nforce) end_knot(of, m->nlink, forces->force[forces->nforce - 1].knot);
   for (int root = 1; of && root < m->nlink; root++) {
     double mass = 0;
-    if (m->link[root].root != root || !m->link[root].driven || !cav_command_floats(m, root)) continue;
+    if (m->link[root].root != root || !m->link[root].driven || !falls(m, root)) continue;
     for (int l = root; l < m->nlink; l++)
       if (m->link[l].root == root) mass += m->link[l].mass;
     const double weight = mass * hypot(hypot(m->gravity[0], m->gravity[1]), m->gravity[2]);

@@ -182,7 +182,10 @@ void cav_certificate_print(FILE *out, const cav_problem *problem, const cav_verd
     fprintf(out, ", with residual forces on its root of up to %.3g %% of the weight", 100 * v->residual_fraction_max);
   // both words in the line that is looked for
   fprintf(out, v->achieved ? "; achieved%s\n" : "; NOT achieved%s\n",
-          v->achieved && !v->ntarget ? " (nothing had to be met)" : "");
+          !v->achieved    ? ""
+          : !v->ntarget   ? " (nothing had to be met)"
+          : !v->certified ? ", by a motion that does not hold"
+                          : "");
   int missed = 0;
   for (int i = 0; i < n; i++) missed += line[i].passed == 0;
   if (!v->certified) fprintf(out, "  %s\n", v->reason);
