@@ -240,6 +240,28 @@ inspected 0 p.xml
 not_said "tabletop', inside"
 check "it lies on the table" grep -qE "^  box .* 1.000 +0.000 +0.800$" out
 
+# --- what is beyond bodies: too far in too little time, too heavy to slide; told of what is asked, not of what could be ---
+
+posture <<'TEXT'
+<scene><body name="crate" pos="1 0 .4"><freejoint name="crate"/><geom name="crate" type="box" size=".3 .3 .4" mass="400"/></body></scene>
+<start key="stand" height="floor"/>
+TEXT
+ask() {
+  sed "s#</problem>#<cost>$1</cost></problem>#" p.xml >asked.xml
+  inspected 0 asked.xml
+}
+ask '<sensor name="there" type="framepos" body="crate" component="x" target="1.5" at="end" weight="900"/>'
+says out "note: to slide 'crate' (400 kg, friction 1) takes 3.92e+03 N; 'torso'"
+ask '<sensor name="there" type="framepos" body="crate" component="x" target="1.01" at="end" weight="900"/>'
+not_said "note: to slide"
+ask '<sensor name="there" type="framepos" body="torso" component="x" target="1" at="0.2" weight="900"/>'
+check "too soon" grep -qE "^note: 'there' has to bring 'torso' 0.9[0-9]+ m on in 0.2 s from rest, by [0-9.]+ g on the mean" out
+ask '<sensor name="there" type="framepos" body="torso" component="x" target="1" at="0.5" weight="900"/>'
+not_said "g on the mean"
+sed -i 's/mass="400"/mass="60"/' p.xml
+ask '<sensor name="there" type="framepos" body="crate" component="x" target="1.5" at="end" weight="900"/>'
+not_said "note: to slide"
+
 # --- a guess through a solid; the ground is what every guess is in a little ---
 cat >block.xml <<TEXT
 <problem name="block" model="$root/problems/models/humanoid.xml">

@@ -131,7 +131,7 @@ static void check_words(void) {
       "<problem name='&lt;q&gt;' model='leg.xml'>\n"
       "<horizon duration='2' timestep='.1' order='euler' close='open'/>\n"
       "<start qpos='1 2 3 -.1' qvel='1 2 3 4'/>\n<goal key='nothing | bent'/>\n"
-      "<guess type='hold' apex='.3' from='.5' to='1.5'/>\n<limits effort='.5' margin='.01'/>\n"
+      "<guess type='hold' apex='.3' bow='.2 -.1' from='.5' to='1.5'/>\n<limits effort='.5' margin='.01'/>\n"
       "<schedule stages='3'><first softness='2' time_constant='1' smoothing='.2' smoothing_self='.1' penalty='10' "
       "iterations='5' "
       "tolerance='.1'/><last iterations='7'/></schedule>\n" TAIL);
@@ -139,6 +139,7 @@ static void check_words(void) {
   CHECK_TEXT(p->name, "<q>");
   CHECK(p->order == CAV_ORDER_EULER && p->close_at_rest == 0 && p->guess == CAV_GUESS_HOLD);
   CHECK(p->guess_height == .3 && p->guess_from == .5 && p->guess_to == 1.5);
+  CHECK(p->guess_bow[0] == .2 && p->guess_bow[1] == -.1);
   CHECK_NEAR_ALL(p->q_start, ((double[]){1, 2, 3, -.1}), 4, 0);
   CHECK_NEAR_ALL(p->v_start, ((double[]){1, 2, 3, 4}), 4, 0);
   CHECK(p->q_goal[3] == -.5 && p->effort_limit == .5 && p->limit_margin == .01);
@@ -419,7 +420,8 @@ static void check_same(const cav_problem *a, const cav_problem *b) {
   CHECK_NEAR_ALL(a->q_start, b->q_start, nq, 0);
   CHECK_NEAR_ALL(a->q_goal, b->q_goal, nq, 0);
   CHECK_NEAR_ALL(a->v_start, b->v_start, a->model->nv, 0);
-  CHECK(a->guess == b->guess && a->guess_height == b->guess_height && a->effort_limit == b->effort_limit &&
+  CHECK(a->guess == b->guess && a->guess_height == b->guess_height && a->guess_bow[0] == b->guess_bow[0] &&
+        a->guess_bow[1] == b->guess_bow[1] && a->effort_limit == b->effort_limit &&
         a->limit_margin == b->limit_margin);
   CHECK(a->schedule.stages == b->schedule.stages);
   check_same_stage(&a->schedule.first, &b->schedule.first);

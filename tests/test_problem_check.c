@@ -100,6 +100,7 @@ static void test_problem(void) {
   REFUSED(t.problem.strength = -1, "strength");
   REFUSED(t.problem.strength = INFINITY, "strength");
   REFUSED(t.problem.guess_height = NAN, "guess_height");
+  REFUSED(t.problem.guess_bow[1] = INFINITY, "guess_bow");
   REFUSED((t.problem.nguess_pose = 2, t.problem.guess_pose = t.pose, t.pose[1].time = 0.05), "guess_pose[1]");
   REFUSED((t.problem.nguess_pose = 2, t.problem.guess_pose = t.pose, t.pose[1].q = NULL), "guess_pose[1]");
   REFUSED((t.problem.nswing = 1, t.problem.swing = &t.swing, t.swing.joint = 1), "swing[0]");

@@ -176,6 +176,48 @@ static void check_interruption(const cav_problem *problem) {
   }
 }
 
+/// Asks for the end once the last phase has gone on for some iterations, and of those who ask for more, once there are gains.
+typedef struct hurry {
+  int how, in_phase, feedback, then;
+} hurry;
+
+static int see(void *context, const cav_progress *progress) {
+  hurry *h = context;
+  h->in_phase += !strcmp(progress->phase, "sqp");
+  h->feedback += !strcmp(progress->phase, "feedback");
+  return 0;
+}
+
+static int hurries(void *context) {
+  const hurry *h = context;
+  if (h->feedback > 0 && h->then) return h->then;
+  return h->in_phase >= 3 ? h->how : 0;
+}
+
+// in the last phase, where rows do not hold at every iterate: who has some seconds gets a motion whose rows hold, gains and a
+// certificate; who has not, the iterate; and who asks for more while gains are chosen, no more than that either
+static void check_hurry(const cav_problem *problem) {
+  static const hurry c[] = {
+      {.how = CAV_STOP_SOON}, {.how = CAV_STOP_NOW}, {.how = CAV_STOP_SOON, .then = CAV_STOP_NOW}};
+  for (int k = 0; k < 3; k++) {
+    hurry h = c[k];
+    cav_solve_options options = cav_solve_options_default();
+    options.observer = see, options.stop = hurries;
+    options.observer_context = options.stop_context = &h;
+    cav_solution *s = NULL;
+    CHECK(cav_solve(problem, &options, NULL, &s, NULL) == CAV_INTERRUPTED);
+    if (!CHECK(s != NULL)) continue;
+    CHECK(h.in_phase >= 3 && h.in_phase < 6 && (h.feedback > 0) == (k != 1) && h.feedback <= 8);
+    CHECK((s->gain_q != NULL) == (k == 0));
+    if (k == 0) {
+      cav_verdict verdict;
+      cav_error error = {0};
+      CHECK(cav_verify_solution(problem, s, &verdict, &error) == CAV_OK && verdict.certified && verdict.achieved);
+    }
+    cav_solution_free(s);
+  }
+}
+
 static void refuse(const cav_problem *problem, const cav_solve_options *options, const cav_trajectory *start,
                    const char *word) {
   cav_solution *s = NULL;
@@ -232,6 +274,7 @@ int main(void) {
   if (problem) {
     check_bits(problem);
     check_interruption(problem);
+    check_hurry(problem);
     check_refusals(problem);
   }
   cav_problem_free(problem);

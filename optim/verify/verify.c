@@ -22,7 +22,11 @@ typedef struct metrics {
 
 static const char *joint_name(const cav_model *model, int joint, char buffer[32]) {
   if (*model->joint[joint].name) return model->joint[joint].name;
-  snprintf(buffer, 32, "joint %d", joint);
+  static const char *const type[] = {[CAV_JOINT_FREE] = "free joint",
+                                     [CAV_JOINT_BALL] = "ball joint",
+                                     [CAV_JOINT_SLIDE] = "slide",
+                                     [CAV_JOINT_HINGE] = "hinge"};
+  snprintf(buffer, 32, "%s %d", type[model->joint[joint].type], joint);
   return buffer;
 }
 

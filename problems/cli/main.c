@@ -66,9 +66,9 @@ static const cav_manual_option options[] = {
      "what to compare, with commas: own (default), strategies (what solve does: own, then repairs and "
      "other strategies where needed), ipopt, limited (Ipopt with limited memory), both"},
     {OPTION_SECONDS, "--seconds", NULL, "S",
-     "solve: ends after S s as by Ctrl-C, with the best iterate kept (default: never); study: processor time that a "
-     "run has "
-     "(default 120)"},
+     "solve: ends after S s; a motion whose constraints hold by then is certified as it is, some seconds later, else "
+     "the "
+     "best iterate is kept (default: never); study: processor time that a run has (default 120)"},
     {OPTION_MARKERS, "--markers", NULL, "FILE", "marker set: which marker of the clip sits where on which body"},
     {OPTION_SCALE, "--scale", NULL, NULL,
      "fit the sizes of segments too, each within a few percent of the whole body's (scale of the marker set: 0.03), "
