@@ -421,8 +421,7 @@ static void check_same(const cav_problem *a, const cav_problem *b) {
   CHECK_NEAR_ALL(a->q_goal, b->q_goal, nq, 0);
   CHECK_NEAR_ALL(a->v_start, b->v_start, a->model->nv, 0);
   CHECK(a->guess == b->guess && a->guess_height == b->guess_height && a->guess_bow[0] == b->guess_bow[0] &&
-        a->guess_bow[1] == b->guess_bow[1] && a->effort_limit == b->effort_limit &&
-        a->limit_margin == b->limit_margin);
+        a->guess_bow[1] == b->guess_bow[1] && a->effort_limit == b->effort_limit && a->limit_margin == b->limit_margin);
   CHECK(a->schedule.stages == b->schedule.stages);
   check_same_stage(&a->schedule.first, &b->schedule.first);
   check_same_stage(&a->schedule.last, &b->schedule.last);

@@ -27,7 +27,7 @@ static const double deep = 0.01;
 static const double buried = 0.5;
 
 /// How far a guess that is under what hangs has to go down to be clear of it, over how far up, and at most, m; how high the foot
-/// of what hangs is over the lowest point of the guess, m.
+/// of what hangs is over the lowest point of the start, m.
 static const double under = 0.25, under_most = 0.1, hanging = 0.05;
 
 /// Time over which the course looks ahead and back, s.
@@ -84,11 +84,10 @@ static double lowest_point(const cav_model *m, const cav_state *state) {
   return lowest;
 }
 
-/// Whether all solids that a model is in at a configuration hang over its lowest point.
-static cav_status is_hung_over(const cav_model *m, cav_state *state, const double *q, int *hung) {
+/// Whether all solids that a model is in at a configuration hang over a height.
+static cav_status is_hung_over(const cav_model *m, cav_state *state, const double *q, double lowest, int *hung) {
   static const double down[3] = {0, 0, -1};
   cav_status status = cav_position(m, state, q);
-  const double lowest = status ? 0 : lowest_point(m, state);
   *hung = 1;
   for (int i = 0; i < state->ncontact && !status; i++) {
     const cav_contact *c = &state->contact[i];
@@ -103,10 +102,10 @@ static cav_status is_hung_over(const cav_model *m, cav_state *state, const doubl
 }
 
 /// Whether a model that a lift frees of solids is under what it is in, and would be free a little lower.
-static cav_status is_under(const cav_model *m, cav_state *state, double *q, double up, int *is) {
+static cav_status is_under(const cav_model *m, cav_state *state, double *q, double lowest, double up, int *is) {
   double depth = 1, down = 0;
   const double most = fmin(under * up, under_most);
-  cav_status status = is_hung_over(m, state, q, is);
+  cav_status status = is_hung_over(m, state, q, lowest, is);
   while (!status && *is && depth > touching && down < most) {
     cav_lift(m, -step, q), down += step;
     status = depth_at(m, state, q, 1, &depth);
@@ -120,7 +119,8 @@ cav_status cav_clear(const cav_model *m, cav_trajectory *at) {
   int n = at->nknot, w = (int)ceil(ahead / at->timestep);
   cav_state *state = cav_state_new(m);
   double *room = calloc(3 * (size_t)n, sizeof *room), *lift = room, *wide = room + n, *course = room + 2 * n;
-  cav_status status = state && room ? CAV_OK : CAV_NO_MEMORY;
+  cav_status status = state && room ? cav_position(m, state, at->q) : CAV_NO_MEMORY;
+  const double lowest = status ? 0 : lowest_point(m, state);
   for (int t = 1; t < n && !status; t++) {
     double *q = at->q + (size_t)t * at->nq, depth = 1;
     for (int k = 0; k < STEPS && !status; k++) {
@@ -133,7 +133,7 @@ cav_status cav_clear(const cav_model *m, cav_trajectory *at) {
     int stays = 0;
     if (lift[t] == 0 || status) continue;
     cav_lift(m, -lift[t], q);
-    status = is_under(m, state, q, lift[t], &stays);
+    status = is_under(m, state, q, lowest, lift[t], &stays);
     cav_lift(m, stays ? 0 : lift[t], q);
     if (stays) lift[t] = 0;
   }
