@@ -118,11 +118,13 @@ static cav_status is_under(const cav_model *m, cav_state *state, double *q, doub
 cav_status cav_clear(const cav_model *m, cav_trajectory *at) {
   int n = at->nknot, w = (int)ceil(ahead / at->timestep);
   cav_state *state = cav_state_new(m);
-  double *room = calloc(3 * (size_t)n, sizeof *room), *lift = room, *wide = room + n, *course = room + 2 * n;
+  double *room = calloc(3 * (size_t)n + (size_t)at->nq, sizeof *room), *lift = room, *wide = room + n,
+         *course = room + 2 * n, *before = room + 3 * n;
   cav_status status = state && room ? cav_position(m, state, at->q) : CAV_NO_MEMORY;
   const double lowest = status ? 0 : lowest_point(m, state);
   for (int t = 1; t < n && !status; t++) {
     double *q = at->q + (size_t)t * at->nq, depth = 1;
+    memcpy(before, q, (size_t)at->nq * sizeof *q);
     for (int k = 0; k < STEPS && !status; k++) {
       status = depth_at(m, state, q, 0, &depth);
       if (depth <= touching) break;
@@ -131,11 +133,10 @@ cav_status cav_clear(const cav_model *m, cav_trajectory *at) {
       lift[t] += up;
     }
     int stays = 0;
-    if (lift[t] == 0 || status) continue;
+    if (lift[t] > 0 && !status) status = is_under(m, state, before, lowest, lift[t], &stays);
+    if (!stays) continue;
     cav_lift(m, -lift[t], q);
-    status = is_under(m, state, q, lowest, lift[t], &stays);
-    cav_lift(m, stays ? 0 : lift[t], q);
-    if (stays) lift[t] = 0;
+    lift[t] = 0;
   }
   for (int t = 0; t < n && !status; t++)
     for (int k = -w; k <= w; k++)
