@@ -240,6 +240,17 @@ inspected 0 p.xml
 not_said "tabletop', inside"
 check "it lies on the table" grep -qE "^  box .* 1.000 +0.000 +0.800$" out
 
+# --- a model that solve refuses ---
+
+cat >muscle.xml <<TEXT
+<mujoco><worldbody><site name="a" pos="0 0 1"/><body><joint name="j" axis="0 1 0"/><geom size=".1"/><site name="b" pos="0 0 .3"/></body>
+</worldbody><tendon><spatial name="t"><site site="a"/><site site="b"/></spatial></tendon><actuator><motor tendon="t"/></actuator></mujoco>
+TEXT
+echo '<problem name="m" model="muscle.xml"><horizon duration="1"/><start/><cost/></problem>' >muscles.xml
+inspected 1 muscles.xml
+says out "solve refuses its model, whose actuators cannot all be planned with (above): muscles.xml"
+not_said "nothing proves it impossible"
+
 # --- what is beyond bodies: too far in too little time, too heavy to slide; told of what is asked, not of what could be ---
 
 posture <<'TEXT'

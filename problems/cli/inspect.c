@@ -322,9 +322,15 @@ static void print_costs(const cav_model *m) {
 }
 
 // which actuators plans can use and which not, one line for each reason
-static void print_actuators(const cav_model *m) {
+/// Actuators that motions can be planned with; solve refuses a model that has others.
+static int count_planned(const cav_model *m) {
   int planned = 0;
   for (int i = 0; i < m->nu; i++) planned += cav_actuator_unplannable(m, i) == NULL;
+  return planned;
+}
+
+static void print_actuators(const cav_model *m) {
+  const int planned = count_planned(m);
   if (!m->nu && m->nv)
     printf("\nnothing is driven: the model has no actuator, gravity, springs and contacts alone move it\n");
   if (!m->nu) return;
@@ -613,7 +619,8 @@ static cav_status print_problem(const cav_problem *p, int all, cav_error *error)
   if (p->guess_bow[0] != 0 || p->guess_bow[1] != 0)
     printf(", with a bow of %g %g m from %g to %g s", p->guess_bow[0], p->guess_bow[1], p->guess_from, p->guess_to);
   printf("\n");
-  if (all && (status = print_equations(p, error))) return status;
+  // of a model that solve refuses there are none
+  if (all && count_planned(p->model) == p->model->nu && (status = print_equations(p, error))) return status;
   printf("  actuators up to %g of their limits, joints and tendons %g rad or m inside theirs\n", p->effort_limit,
          p->limit_margin);
   print_terms(p, 0, all);
@@ -681,11 +688,13 @@ int cav_command_inspect(const cav_command_line *line) {
                ? "\n--all: joints, places of bodies, roles, equations, schedule, and what an evaluation runs\n"
                : "\n--all: what an evaluation runs and leaves out, its time and memory\n");
   // the verdict once more, where nothing buries it
+  const int refused = scene.problem && count_planned(scene.model) < scene.model->nu;
   if (!status && scene.problem)
-    printf(proofs ? "\nit cannot be solved, as the first lines say: %s\n"
-                  : "\nnothing proves it impossible: cavort solve %s\n",
+    printf(proofs    ? "\nit cannot be solved, as the first lines say: %s\n"
+           : refused ? "\nsolve refuses its model, whose actuators cannot all be planned with (above): %s\n"
+                     : "\nnothing proves it impossible: cavort solve %s\n",
            line->stated ? line->stated : line->operand);
   cav_command_free(&scene);
   if (status) return cav_command_fail(&error);
-  return proofs ? CAV_EXIT_NOT_CERTIFIED : CAV_EXIT_CERTIFIED;
+  return proofs || refused ? CAV_EXIT_NOT_CERTIFIED : CAV_EXIT_CERTIFIED;
 }
