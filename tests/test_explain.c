@@ -172,6 +172,14 @@ static void check_inside_a_box(void) {
     const cav_reason *r = &o.explanation.conflict[0];
     CHECK(o.status == CAV_NOT_CONVERGED && o.explanation.nconflict > 0);
     CHECK(names(r->cure, "Geom 'ball' is") && names(r->cure, "inside 'box'") && !strstr(r->cure, "Pulls"));
+    CHECK(names(r->cure, "<schedule solids=\"grow\"/>"));
+    // what was done is not advised
+    cav_problem grown = *o.problem;
+    cav_error error = {0};
+    grown.schedule.solids = CAV_SOLIDS_GROW;
+    CHECK(cav_explain(&grown, o.solution->trajectory, &o.solution->contact, o.solution->nrow, o.solution->row,
+                      &o.explanation, &error) == CAV_OK);
+    CHECK(names(r->cure, "inside 'box'") && names(r->cure, "<waypoint>") && !strstr(r->cure, "solids="));
   }
   done(&o);
 }

@@ -484,12 +484,13 @@ static const cav_binding *stuck(const inquiry *in, int knot) {
 static void cure_stuck(const inquiry *in, const cav_binding *row, char *out, size_t size) {
   const cav_geom *other, *solid = solid_of(in->model, row, &other);
   const int nameless = !*other->name && *in->model->body[other->body].name;
-  snprintf(
-      out, size,
-      "%s '%.60s' is %.3g mm inside '%.60s' there, and no force leads out: <schedule solids=\"grow\"/>, or a guess "
-      "that stays clear of it.",
-      nameless ? "A geom of" : "Geom", nameless ? in->model->body[other->body].name : other->name, 1e3 * row->value,
-      *solid->name ? solid->name : in->model->body[solid->body].name);
+  const int grows = in->problem->schedule.solids == CAV_SOLIDS_GROW;
+  snprintf(out, size,
+           "%s '%.60s' is %.3g mm inside '%.60s' there, and no force leads out: %sa guess that stays clear of it%s.",
+           nameless ? "A geom of" : "Geom", nameless ? in->model->body[other->body].name : other->name,
+           1e3 * row->value, *solid->name ? solid->name : in->model->body[solid->body].name,
+           grows ? "" : "<schedule solids=\"grow\"/>, or ",
+           grows ? ", by postures on the way (<waypoint>) or round it (bow=)" : "");
 }
 
 /// Whether a force without an actuator is missed up to the end, which has to be at rest, of what no actuator moves.

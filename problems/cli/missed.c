@@ -253,17 +253,16 @@ static void tell_untouched(const miss *s, const char *body, const char *folder, 
   else if (*pushed)
     snprintf(
         text + n, size - (size_t)n,
-        ". The strategy push brought a hand to it and missed: %.160s. Next: more time, close=\"open\" in <horizon> "
-        "where it may move at the end, less friction or a lighter body to see whether it is too heavy, or "
-        "postures in <guess> that push it.",
-        pushed);
+        ". The strategy push brought a hand to it and missed: %.160s. Next: more time, %sless friction or a lighter "
+        "body to see whether it is too heavy, or postures in <guess> that push it.",
+        pushed, p->close_at_rest ? "close=\"open\" in <horizon> where it may move at the end, " : "");
   else
     snprintf(
         text + n, size - (size_t)n,
         ": from afar no change of the motion brings it nearer, whatever its weight. Next: bring a hand to it, by "
-        "<sensor type=\"framepos\" body=\"%.40s\" reftype=\"body\" refname=\"%.40s\" target=\"0 0 0\" from=\"%.2g\" "
-        "weight=\"300\" within=\"any\"/>, its target at the side to push from, or by postures in <guess> that "
-        "have it there.",
+        "<sensor type=\"framepos\" body=\"%.40s\" reftype=\"xbody\" refname=\"%.40s\" target=\"0 0 0\" from=\"%.2g\" "
+        "weight=\"300\" within=\"any\"/>, its target at the side to push from, in the axes of that body, or by "
+        "postures in <guess> that have it there.",
         hand_of(p->model), body, p->duration / 3);
 }
 
