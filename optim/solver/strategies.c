@@ -285,7 +285,7 @@ static cav_status add_pushed(const cav_problem *problem, cav_strategy *strategy,
       : hand.touches
           ? "with what is to touch brought there first, contacts sharp from there on"
           : "with a hand brought first to the side that what has to move is pushed from, contacts sharp from there on";
-  g->led = carry.found && !g->decorated && !g->collides && !g->sinks && problem->guess == CAV_GUESS_INTERPOLATE &&
+  g->led = (carry.found || (hangs(problem->model) && !hand.touches)) && !g->decorated && !g->collides && !g->sinks && problem->guess == CAV_GUESS_INTERPOLATE &&
            !cav_upright_held(problem);
   if (g->led)
     begin_with(strategy, &push);
