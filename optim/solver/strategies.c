@@ -167,7 +167,7 @@ typedef struct guesses {
   cav_strategy bypass;                   ///< round what it runs into, on the ground
   int collides, decorated, sinks;        ///< what the stated guess does, and is
   int pivots;                            ///< 1: it turns four feet or more on the spot, where they stand
-  int led;                               ///< 1: a file without a guess is begun with both hands led
+  int led;                               ///< 1: a file without a guess is begun with hands led
 } guesses;
 
 /// With what no actuator moves kept upright. What tips is not mended by what else is missed, so this comes first where terms
@@ -285,8 +285,8 @@ static cav_status add_pushed(const cav_problem *problem, cav_strategy *strategy,
       : hand.touches
           ? "with what is to touch brought there first, contacts sharp from there on"
           : "with a hand brought first to the side that what has to move is pushed from, contacts sharp from there on";
-  g->led = (carry.found || (hangs(problem->model) && !hand.touches)) && !g->decorated && !g->collides && !g->sinks && problem->guess == CAV_GUESS_INTERPOLATE &&
-           !cav_upright_held(problem);
+  g->led = (carry.found || (hangs(problem->model) && !hand.touches)) && !g->decorated && !g->collides && !g->sinks &&
+           problem->guess == CAV_GUESS_INTERPOLATE && !cav_upright_held(problem);
   if (g->led)
     begin_with(strategy, &push);
   else
