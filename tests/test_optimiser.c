@@ -126,6 +126,32 @@ static void test_shifts(const cav_problem *p) {
   CHECK(!cav_optimiser_new(p, &options, NULL, &error) && error.status == CAV_BAD_INPUT);
 }
 
+static int asked;
+static int ask(void *context) {
+  (void)context;
+  return asked;
+}
+
+// one call that is stopped does not stop the next
+static void test_stopped(const cav_problem *p) {
+  static const int how[] = {CAV_STOP_NOW, CAV_STOP_SOON};
+  cav_solve_options options = cav_solve_options_default();
+  cav_error error;
+  options.stop = ask;
+  cav_optimiser *o = cav_optimiser_new(p, &options, NULL, &error);
+  if (!CHECK(o != NULL)) return;
+  for (int k = 0; k < 2; k++) {
+    cav_progress last;
+    asked = how[k];
+    CHECK(cav_optimiser_solve(o, 0, NULL, &error) == CAV_INTERRUPTED);
+    CHECK(cav_optimiser_iterate(o, 2, NULL) == CAV_INTERRUPTED);
+    asked = 0;
+    CHECK(cav_optimiser_solve(o, 0, &last, &error) == CAV_OK && last.unactuated < 1e-6);
+    CHECK(cav_optimiser_iterate(o, 2, NULL) == CAV_OK);
+  }
+  cav_optimiser_free(o);
+}
+
 int main(void) {
   char folder[] = "/tmp/cavort-optimiser-XXXXXX", command[300];
   if (!CHECK(mkdtemp(folder) != NULL)) return check_result();
@@ -133,6 +159,7 @@ int main(void) {
   if (p) {
     test_solves(p);
     test_shifts(p);
+    test_stopped(p);
     cav_problem_free(p);
   }
   snprintf(command, sizeof command, "rm -rf %s", folder);

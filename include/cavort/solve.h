@@ -55,8 +55,9 @@ typedef struct cav_progress {
 /// CAV_INTERRUPTED and the best iterate.
 typedef int (*cav_observer)(void *context, const cav_progress *progress);
 
-/// Asked many times an iteration, by the thread that solves; nonzero ends the solve as an observer does: at once, or after
-/// a motion whose rows hold has got feedback gains, of a few sets (seconds), while it is asked for the end at once.
+/// Asked many times an iteration, by the thread that solves; nonzero ends the solve as an observer does. CAV_STOP_SOON: where
+/// gains are asked for, rows that are nearly in are brought in first, and a motion whose rows hold gets gains, of a few sets:
+/// seconds, in which CAV_STOP_NOW, or any other value, is still obeyed.
 typedef int (*cav_stop)(void *context);
 enum { CAV_STOP_NOW = 1, CAV_STOP_SOON = 2 };
 

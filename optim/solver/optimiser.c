@@ -67,6 +67,7 @@ static void begin(cav_optimiser *o) {
   run->start = run->noted = cav_clock();
   run->deadline = o->options.max_seconds > 0 ? run->start + o->options.max_seconds : INFINITY;
   run->begin = run->solution->iterations;
+  run->soon = run->at_once = run->ending = 0;
   run->failed = CAV_OK;
   run->refusal = run->tr->failure = (cav_error){0};
 }
