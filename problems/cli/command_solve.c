@@ -285,6 +285,12 @@ static void tell_cause(const cav_race *race) {
   }
 }
 
+// parameters that are not found yet are worth nothing: whatever was asked for ends them at once
+static int ends(void *context) {
+  (void)context;
+  return interrupted != 0;
+}
+
 static int solve_from(const cav_command_line *line, const cav_problem *problem, const char *folder,
                       const cav_provenance *provenance, const char *key, const beginning *b) {
   cav_error error = {0};
@@ -314,6 +320,7 @@ static int solve_from(const cav_command_line *line, const cav_problem *problem, 
     race.options.nmultiplier = b->motion->nmultiplier;
     race.options.multiplier = b->motion->final_multiplier;
   }
+  race.options.stop = ends;
   if (problem->nparameter) return cav_command_estimate(line, &race);
   // a start that is given is the only one
   int most = b->start ? 1 : line->strategies ? line->strategies : CAV_STRATEGIES;
