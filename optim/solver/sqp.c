@@ -616,7 +616,8 @@ static cav_status hold(const cav_solve_run *run, descent *d) {
   return d->held ? CAV_OK : CAV_NO_MEMORY;
 }
 
-/// Of a run that is stopped the last motion whose rows held; where there is time, and gains are asked for, the last one, if its rows can be brought in.
+/// Of a run that is stopped the last motion whose rows held; where there is time, and gains are asked for, the last one, if its
+/// rows can be brought in.
 static cav_status leave(cav_solve_run *run, descent *d) {
   run->ending = run->soon && !run->at_once && run->options->gains;
   if (run->ending && cav_quadratic_length(d->qp) > 0 && cav_transcription_values(run->tr, run->at) == CAV_OK &&
