@@ -181,7 +181,8 @@ static cav_status solve_and_conclude(cav_solve_run *run, cav_status *end, cav_er
   // the reason of the solve goes before what verification of the gains says
   cav_error inner = {0};
   *end = conclude(run, status == CAV_INTERRUPTED, &inner);
-  while (*end == CAV_INTERRUPTED) {
+  // asked for the end soon, then at once; who refuses a motion refuses it again
+  for (int i = 0; i < 2 && *end == CAV_INTERRUPTED; i++) {
     status = CAV_INTERRUPTED;
     end_anyhow(run);
     const int gains = run->solution->gain_q != NULL;
