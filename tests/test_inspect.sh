@@ -248,7 +248,7 @@ cat >muscle.xml <<TEXT
 TEXT
 echo '<problem name="m" model="muscle.xml"><horizon duration="1"/><start/><cost/></problem>' >muscles.xml
 inspected 1 muscles.xml
-says out "solve refuses its model, whose actuators cannot all be planned with (above): muscles.xml"
+says out "solve refuses its model, some of whose actuators cannot be planned with (above): muscles.xml"
 not_said "nothing proves it impossible"
 
 # --- what is beyond bodies: too far in too little time, too heavy to slide; told of what is asked, not of what could be ---

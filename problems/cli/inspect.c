@@ -691,7 +691,7 @@ int cav_command_inspect(const cav_command_line *line) {
   const int refused = scene.problem && count_planned(scene.model) < scene.model->nu;
   if (!status && scene.problem)
     printf(proofs    ? "\nit cannot be solved, as the first lines say: %s\n"
-           : refused ? "\nsolve refuses its model, whose actuators cannot all be planned with (above): %s\n"
+           : refused ? "\nsolve refuses its model, some of whose actuators cannot be planned with (above): %s\n"
                      : "\nnothing proves it impossible: cavort solve %s\n",
            line->stated ? line->stated : line->operand);
   cav_command_free(&scene);
