@@ -59,7 +59,12 @@ typedef int (*cav_observer)(void *context, const cav_progress *progress);
 /// gains are asked for, rows that are nearly in are brought in first, and a motion whose rows hold gets gains, of a few sets:
 /// seconds, in which CAV_STOP_NOW, or any other value, is still obeyed.
 typedef int (*cav_stop)(void *context);
-enum { CAV_STOP_NOW = 1, CAV_STOP_SOON = 2 };
+
+/// What a stop may ask for.
+enum {
+  CAV_STOP_NOW = 1, ///< the end, at once
+  CAV_STOP_SOON = 2 ///< the end, after gains
+};
 
 /// Places of a solve between two of its parts, X(place, word in files, what comes next). A solve goes through them in
 /// this order; only where rows do not come in does it come to those after the first programme.
