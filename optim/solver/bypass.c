@@ -8,11 +8,11 @@
 
 #include "clear.h"
 #include "continuation.h"
+#include "detour.h"
 #include "role.h"
 
 enum { KNOTS = 41 };
 static const double clear = 0.06;               // m: from solids, but where start or goal are nearer
-static const double inside = 1e-3;              // m: deeper than start or goal
 static const double step = 0.05, most = 1.6;    // m: of bows
 static const double least_travel = 0.2;         // m
 static const double high = 0.8, grounded = 0.1; // of the height of the root: a top from there on, a foot up to there
@@ -26,26 +26,11 @@ typedef struct search {
   double floor, height; // m: of the lowest point of the body at the start; of its root over that
 } search;
 
-// the first free joint; -1: there is none
-static int root_of(const cav_model *m) {
-  int j = 0;
-  while (j < m->njoint && m->joint[j].type != CAV_JOINT_FREE) j++;
-  return j < m->njoint ? j : -1;
-}
-
 // where the body stands at the start, and how high its root is over that
 static cav_status find_height(search *s, int root) {
-  static const double down[3] = {0, 0, -1};
   const cav_model *m = s->bowed.model;
-  cav_status status = cav_position(m, s->state, s->bowed.q_start);
-  s->floor = INFINITY;
-  for (int g = 0; g < m->ngeom && !status; g++) {
-    const cav_geom *geom = &m->geom[g];
-    if (m->link[geom->link].root != m->joint[root].link || !(geom->contype || geom->conaffinity)) continue;
-    cav_pose pose;
-    cav_object_pose(m, s->state, CAV_OBJECT_GEOM, g, &pose);
-    s->floor = fmin(s->floor, pose.pos[2] - cav_geom_reach(geom, &pose, down));
-  }
+  const cav_status status = cav_position(m, s->state, s->bowed.q_start);
+  s->floor = status ? 0 : cav_lowest_point(m, s->state, m->joint[root].link);
   s->height = s->bowed.q_start[m->joint[root].q + 2] - s->floor;
   return status;
 }
@@ -59,21 +44,6 @@ static int is_tall(const search *s, int g) {
   const double top = pose.pos[2] + cav_geom_reach(geom, &pose, up),
                bottom = pose.pos[2] - cav_geom_reach(geom, &pose, down);
   return top - s->floor > high * s->height && bottom - s->floor < grounded * s->height;
-}
-
-// pairs are to be clear, those that start or goal have nearer as far as there
-static cav_status want_apart(const search *s) {
-  const double *const ends[2] = {s->bowed.q_start, s->bowed.q_goal};
-  cav_status status = CAV_OK;
-  for (int i = 0; i < s->bowed.model->npair; i++) s->apart[i] = clear;
-  for (int k = 0; k < 2 && !status; k++) {
-    status = cav_position(s->bowed.model, s->state, ends[k]);
-    for (int i = 0; i < s->state->ncontact && !status; i++) {
-      const cav_contact *c = &s->state->contact[i];
-      s->apart[c->pair] = fmin(s->apart[c->pair], c->dist - inside);
-    }
-  }
-  return status;
 }
 
 // whether the way is nowhere nearer to solids than is wanted; *tall: it runs into something tall
@@ -100,7 +70,7 @@ static cav_status search_all(search *s, int root, cav_strategy *strategy) {
   int good = 1, tall = 0;
   if (way < least_travel) return CAV_OK;
   cav_status status = find_height(s, root);
-  if (!status) status = want_apart(s);
+  if (!status) status = cav_detour_apart(&s->bowed, s->state, clear, s->apart);
   // what is near is listed
   s->state->options.smoothing = clear;
   if (!status) status = look(s, &good, &tall);
@@ -116,7 +86,7 @@ static cav_status search_all(search *s, int root, cav_strategy *strategy) {
 
 cav_status cav_bypass_find(const cav_problem *problem, cav_strategy *strategy) {
   const cav_model *m = problem->model;
-  const int root = root_of(m);
+  const int root = cav_first_free(m);
   strategy->bow[0] = strategy->bow[1] = 0;
   if (root < 0) return CAV_OK;
   search s = {.bowed = *problem};

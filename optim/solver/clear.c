@@ -71,13 +71,19 @@ static cav_status depth_at(const cav_model *m, cav_state *state, const double *q
   return status;
 }
 
-/// Lowest point of what moves at the last position.
-static double lowest_point(const cav_model *m, const cav_state *state) {
+int cav_first_free(const cav_model *m) {
+  int j = 0;
+  while (j < m->njoint && m->joint[j].type != CAV_JOINT_FREE) j++;
+  return j < m->njoint ? j : -1;
+}
+
+double cav_lowest_point(const cav_model *m, const cav_state *state, int root) {
   static const double down[3] = {0, 0, -1};
   double lowest = INFINITY;
   for (int g = 0; g < m->ngeom; g++) {
     cav_pose pose;
     if (m->geom[g].link == 0 || !(m->geom[g].contype || m->geom[g].conaffinity)) continue;
+    if (root && m->link[m->geom[g].link].root != root) continue;
     cav_object_pose(m, state, CAV_OBJECT_GEOM, g, &pose);
     lowest = fmin(lowest, pose.pos[2] - cav_geom_reach(&m->geom[g], &pose, down));
   }
@@ -121,7 +127,7 @@ cav_status cav_clear(const cav_model *m, cav_trajectory *at) {
   double *room = calloc(3 * (size_t)n + (size_t)at->nq, sizeof *room), *lift = room, *wide = room + n,
          *course = room + 2 * n, *before = room + 3 * n;
   cav_status status = state && room ? cav_position(m, state, at->q) : CAV_NO_MEMORY;
-  const double lowest = status ? 0 : lowest_point(m, state);
+  const double lowest = status ? 0 : cav_lowest_point(m, state, 0);
   for (int t = 1; t < n && !status; t++) {
     double *q = at->q + (size_t)t * at->nq, depth = 1;
     memcpy(before, q, (size_t)at->nq * sizeof *q);

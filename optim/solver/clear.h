@@ -7,6 +7,13 @@
 /// Raises the roots that can rise.
 void cav_lift(const cav_model *m, double height, double *q);
 
+/// The first free joint; -1: there is none.
+int cav_first_free(const cav_model *model);
+
+/// Height of the lowest point of a tree's geoms that may touch, by its root link, or of all that moves (0), at the state's last
+/// position, m; infinite: there is none.
+double cav_lowest_point(const cav_model *model, const cav_state *state, int root);
+
 /// Whether a contact is with a solid of the world, of which grounds are none.
 int cav_is_with_solid(const cav_model *model, const cav_contact *contact);
 

@@ -42,16 +42,15 @@ static cav_status is_clear(search *s, int *good) {
   return status;
 }
 
-// pairs are to be so far apart, those that start or goal have nearer as far as there
-static cav_status want_apart(const search *s, double distance) {
-  const double *const ends[2] = {s->bowed.q_start, s->bowed.q_goal};
+cav_status cav_detour_apart(const cav_problem *problem, cav_state *state, double distance, double *apart) {
+  const double *const ends[2] = {problem->q_start, problem->q_goal};
   cav_status status = CAV_OK;
-  for (int i = 0; i < s->bowed.model->npair; i++) s->apart[i] = distance;
+  for (int i = 0; i < problem->model->npair; i++) apart[i] = distance;
   for (int k = 0; k < 2 && !status; k++) {
-    status = cav_position(s->bowed.model, s->state, ends[k]);
-    for (int i = 0; i < s->state->ncontact && !status; i++) {
-      const cav_contact *c = &s->state->contact[i];
-      s->apart[c->pair] = fmin(s->apart[c->pair], c->dist - inside);
+    status = cav_position(problem->model, state, ends[k]);
+    for (int i = 0; i < state->ncontact && !status; i++) {
+      const cav_contact *c = &state->contact[i];
+      apart[c->pair] = fmin(apart[c->pair], c->dist - inside);
     }
   }
   return status;
@@ -104,7 +103,7 @@ static cav_status search_all(search *s, cav_strategy *strategy) {
   // what is two centimetres away is listed
   s->state->options.smoothing = clear;
   for (int tight = 0; tight < 2 && !strategy->nswing && !status; tight++) {
-    status = want_apart(s, tight ? 0 : clear);
+    status = cav_detour_apart(&s->bowed, s->state, tight ? 0 : clear, s->apart);
     for (int k = 1; k <= CUBES && !strategy->nswing && !status; k++)
       status = search_cube(s, largest * k / CUBES, strategy);
   }
@@ -134,7 +133,7 @@ static void search_free(search *s) {
 
 cav_status cav_detour_straight(const cav_problem *problem, int *is_free) {
   search s = search_of(problem);
-  cav_status status = has_memory(&s) ? want_apart(&s, 0) : CAV_NO_MEMORY;
+  cav_status status = has_memory(&s) ? cav_detour_apart(&s.bowed, s.state, 0, s.apart) : CAV_NO_MEMORY;
   if (!status) status = is_clear(&s, is_free);
   search_free(&s);
   return status;

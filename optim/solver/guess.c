@@ -50,9 +50,8 @@ static void rotation(const cav_problem *problem, double fraction, double *q) {
 /// Moves the first free joint aside by a fraction of the guess's bow.
 static void bow(const cav_problem *problem, double fraction, double *q) {
   const cav_model *m = problem->model;
-  int j = 0;
-  while (j < m->njoint && m->joint[j].type != CAV_JOINT_FREE) j++;
-  for (int k = 0; k < 2 && j < m->njoint; k++) q[m->joint[j].q + k] += fraction * problem->guess_bow[k];
+  const int j = cav_first_free(m);
+  for (int k = 0; k < 2 && j >= 0; k++) q[m->joint[j].q + k] += fraction * problem->guess_bow[k];
 }
 
 /// Lays the swings over q, within the joints' ranges: a knee swings one way only.
