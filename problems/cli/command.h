@@ -229,6 +229,9 @@ int cav_command_base(const cav_problem *problem, const cav_term *term);
 /// measures it. asked.c.
 int cav_command_unmeasured(const cav_problem *problem, const cav_term *term);
 
+/// Mass of a tree, by its root link, kg. postures.c.
+double cav_command_tree_mass(const cav_model *model, int root);
+
 /// Whether gravity and contacts alone act on a tree of links that floats, none of it lifted by buoyancy. postures.c.
 int cav_command_floats(const cav_model *model, int root);
 

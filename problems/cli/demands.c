@@ -54,13 +54,6 @@ static int starts_at_rest(const cav_problem *p, int root) {
   return 1;
 }
 
-static double mass_of(const cav_model *m, int root) {
-  double mass = 0;
-  for (int l = root; l < m->nlink; l++)
-    if (m->link[l].root == root) mass += m->link[l].mass;
-  return mass;
-}
-
 static int tell_haste(FILE *out, const cav_problem *p, const cav_term *term, int link, double way) {
   const cav_model *m = p->model;
   const double g = hypot(hypot(m->gravity[0], m->gravity[1]), m->gravity[2]);
@@ -90,7 +83,7 @@ static int tell_weight(FILE *out, const cav_problem *p, const cav_state *state, 
   const cav_model *m = p->model;
   const double g = hypot(hypot(m->gravity[0], m->gravity[1]), m->gravity[2]);
   const int thing = m->link[link].root;
-  const double rubs = friction_of(m, state, thing), takes = rubs * mass_of(m, thing) * g;
+  const double rubs = friction_of(m, state, thing), takes = rubs * cav_command_tree_mass(m, thing) * g;
   if (m->link[thing].driven || !cav_command_floats(m, thing) || way < slides || !(takes > 0)) return 0;
   double holds = 0, mass = 0;
   int feet = 0;
@@ -98,14 +91,15 @@ static int tell_weight(FILE *out, const cav_problem *p, const cav_state *state, 
     if (m->link[root].root != root || !m->link[root].driven) continue;
     // what hangs on the world holds as much as its actuators do
     if (!cav_command_floats(m, root)) return 0;
-    holds += friction_of(m, state, root) * mass_of(m, root) * g, mass += mass_of(m, root), feet = root;
+    holds += friction_of(m, state, root) * cav_command_tree_mass(m, root) * g, mass += cav_command_tree_mass(m, root),
+        feet = root;
   }
   if (!(holds > 0) || takes < held * holds) return 0;
   fprintf(
       out,
       "note: to slide '%.60s' (%.3g kg, friction %.2g) takes %.3g N; '%.60s' (%.3g kg) is held by its feet with %.3g N "
       "where it stands: a lighter thing, or one with less friction\n",
-      name_of(m, thing), mass_of(m, thing), rubs, takes, name_of(m, feet), mass, holds);
+      name_of(m, thing), cav_command_tree_mass(m, thing), rubs, takes, name_of(m, feet), mass, holds);
   return 1;
 }
 

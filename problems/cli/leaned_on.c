@@ -339,10 +339,8 @@ static void tell_blows(FILE *out, const cav_problem *problem, const cav_forces *
   }
   if (of && forces->nforce) end_knot(of, m->nlink, forces->force[forces->nforce - 1].knot);
   for (int root = 1; of && root < m->nlink; root++) {
-    double mass = 0;
     if (m->link[root].root != root || !m->link[root].driven || !falls(m, root)) continue;
-    for (int l = root; l < m->nlink; l++)
-      if (m->link[l].root == root) mass += m->link[l].mass;
+    const double mass = cav_command_tree_mass(m, root);
     const double weight = mass * hypot(hypot(m->gravity[0], m->gravity[1]), m->gravity[2]);
     int worst = root;
     for (int l = root; l < m->nlink; l++)
@@ -369,9 +367,8 @@ static void tell_ending(FILE *out, const cav_problem *problem, const cav_forces 
     return;
   for (int root = 1; root < m->nlink; root++) {
     if (!cav_command_floats(m, root)) continue;
-    double borne[3] = {0}, mass = 0;
-    for (int l = root; l < m->nlink; l++)
-      if (m->link[l].root == root) mass += m->link[l].mass;
+    const double mass = cav_command_tree_mass(m, root);
+    double borne[3] = {0};
     for (int i = 0; i < forces->nforce; i++) {
       const cav_contact_force *f = &forces->force[i];
       const int one = m->link[m->geom[f->geom1].link].root, other = m->link[m->geom[f->geom2].link].root;

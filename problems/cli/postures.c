@@ -145,6 +145,13 @@ int cav_command_tell_goal(FILE *out, const cav_problem *p) {
   return tell_disagreement(out, p, NULL);
 }
 
+double cav_command_tree_mass(const cav_model *m, int root) {
+  double mass = 0;
+  for (int l = root; l < m->nlink; l++)
+    if (m->link[l].root == root) mass += m->link[l].mass;
+  return mass;
+}
+
 int cav_command_floats(const cav_model *m, int root) {
   const cav_link *link = &m->link[root];
   if (link->parent != 0 || !link->njoint || m->joint[link->joint].type != CAV_JOINT_FREE) return 0;
