@@ -39,7 +39,7 @@ CAV_API const cav_solver_rule *cav_solver_rule_of(cav_solver solver);
 /// One line of progress, and of the log.
 typedef struct cav_progress {
   const char *phase;   ///< "kinematics", "continuation", "sqp", "softened", "multipliers", "restoration", "ipopt",
-                       ///< "diagnosis", "recovery", "feedback"
+                       ///< "diagnosis", "recovery", "feedback"; "sampling" by searches: cost is the score of one
   int stage, stages;   ///< where the phase is, from 1
   double fraction;     ///< of the whole solve that is done, by the stages that are behind it: an estimate
   int iteration;       ///< over the whole solve
@@ -331,7 +331,7 @@ CAV_API const cav_options *cav_optimiser_contact(const cav_optimiser *optimiser)
 CAV_API const double *cav_optimiser_multipliers(cav_optimiser *optimiser, int *n);
 
 enum {
-  CAV_STRATEGIES = 40,       ///< most strategies of a problem
+  CAV_STRATEGIES = 56,       ///< most strategies of a problem
   CAV_STRATEGY_SWINGS = 16,  ///< most sines of one: two joints of eight limbs, further ones stand
   CAV_STRATEGY_CHANGES = 160 ///< room for what a repair changed, in words
 };
@@ -369,12 +369,13 @@ typedef struct cav_strategy {
   int nreach; ///< joints of a guess that ends elsewhere than at the goal: where terms of the end ask
   cav_joint_value reach[CAV_STRATEGY_SWINGS]; ///< [nreach]
   int ground;                                 ///< 1: its guess stands on what is below it
-  int hand;                      ///< hands that are brought first to what has to be pushed, carried or touched: 1 or 2
-  double height, from, to;       ///< not stated: of a ballistic arc, m, and when, s
-  double bow[2];                 ///< not stated: cav_problem.guess_bow, over the whole way
-  int flies;                     ///< 1: start and goal are held before and after that arc
-  cav_guess_pose pose[2];        ///< where it flies
-  cav_schedule schedule;         ///< schedule that it takes
+  int samples;             ///< it begins with the best of many simulated motions, other draws by number; 0: it does not
+  int hand;                ///< hands that are brought first to what has to be pushed, carried or touched: 1 or 2
+  double height, from, to; ///< not stated: of a ballistic arc, m, and when, s
+  double bow[2];           ///< not stated: cav_problem.guess_bow, over the whole way
+  int flies;               ///< 1: start and goal are held before and after that arc
+  cav_guess_pose pose[2];  ///< where it flies
+  cav_schedule schedule;   ///< schedule that it takes
   double effort_limit, timestep; ///< those of the problem where 0
   double strength;               ///< a diagnosis: cav_problem.strength
   int open;                      ///< 1: a diagnosis that need not end at rest; 0 without strength: may last longer

@@ -18,6 +18,7 @@
 #include "periodicity.h"
 #include "pump.h"
 #include "reach.h"
+#include "sampling.h"
 #include "upright.h"
 
 _Static_assert((int)CAV_HAND_TERMS <= (int)CAV_CARRY_TERMS, "the room for terms that lead");
@@ -42,6 +43,9 @@ enum {
 /// What the duration of a diagnosis costs, 1/s², so that it is not far from the shortest.
 static const double haste = 100;
 
+/// Where a sampled motion goes on, of the schedule's way, where it does not straight to the optimum.
+static const double late = 0.9;
+
 /// Where a motion solved under another order goes on: fraction of the schedule's way, and stages from there (METHOD.md,
 /// 7).
 static const double resumed_fraction = 0.4;
@@ -57,9 +61,10 @@ static void add(cav_strategy *strategy, int *n, const cav_strategy *from, const 
 
 // what is nearly there is mended before anything else is tried
 static void add_near(cav_strategy *strategy, int *n, const cav_strategy *stated, int times) {
-  static const char *const name[] = {"near-1",  "near-2",  "near-3",  "near-4",  "near-5",  "near-6",  "near-7",
-                                     "near-8",  "near-9",  "near-10", "near-11", "near-12", "near-13", "near-14",
-                                     "near-15", "near-16", "near-17", "near-18", "near-19", "near-20"};
+  static const char *const name[] = {"near-1",  "near-2",  "near-3",  "near-4",  "near-5",  "near-6",
+                                     "near-7",  "near-8",  "near-9",  "near-10", "near-11", "near-12",
+                                     "near-13", "near-14", "near-15", "near-16", "near-17", "near-18",
+                                     "near-19", "near-20", "near-21", "near-22", "near-23", "near-24"};
   cav_strategy repaired = *stated;
   repaired.use = CAV_STRATEGY_NEAR;
   size_t before = 0;
@@ -265,6 +270,17 @@ static cav_status add_pumped(const cav_problem *problem, cav_strategy *strategy,
   return status;
 }
 
+/// From the best of many simulated motions, where a model is small enough for that.
+static void add_sampled(const cav_problem *problem, cav_strategy *strategy, int *n) {
+  static const char *const name[] = {"sample", "resample"};
+  cav_strategy sampled = {.order = problem->order, .schedule = problem->schedule};
+  sampled.text = "from the best of some thousands of simulated motions";
+  for (int i = 0; i < 2 && cav_sample_serves(problem); i++) {
+    sampled.samples = i + 1;
+    add_mended(strategy, n, &sampled, name[i]);
+  }
+}
+
 /// With hands brought first to what has to be pushed, carried or touched: both of what stands on a free base, or else one.
 /// A file without a guess whose terms bring no hands there is begun so.
 static cav_status add_pushed(const cav_problem *problem, cav_strategy *strategy, int *n, const cav_strategy *stated,
@@ -429,6 +445,7 @@ cav_status cav_strategy_list(const cav_problem *problem, cav_strategy strategy[C
   if (status == CAV_OK && !cav_upright_held(problem)) status = add_upright(problem, strategy, n, &stated);
   if (status == CAV_OK) status = add_posture(problem, strategy, n, &stated);
   if (status == CAV_OK) status = add_pumped(problem, strategy, n, &swings_up);
+  if (status == CAV_OK) add_sampled(problem, strategy, n);
   if (status == CAV_OK) status = add_others(problem, strategy, n, &g);
   if (status != CAV_OK) return status;
   begin_upright(strategy, *n);
@@ -627,12 +644,47 @@ static cav_status solve_reached(const cav_problem *taken, const cav_strategy *st
   return status;
 }
 
+/// From the best of simulated motions, which obeys the last stage's law: straight to the optimum, and where that loses it, so
+/// that its rows do not come in or costs are higher than they were, by the last stages. The cheaper of motions whose rows
+/// come in.
+static cav_status solve_sampled(const cav_problem *taken, int number, const cav_solve_options *options,
+                                cav_solution **solution, cav_error *error) {
+  const int from[] = {taken->schedule.stages + 1, (int)(late * taken->schedule.stages)};
+  enum { WAYS = sizeof from / sizeof *from };
+  cav_solve_options rest = options ? *options : cav_solve_options_default();
+  cav_trajectory *at =
+      cav_trajectory_new(taken->model, (int)lround(taken->duration / taken->timestep) + 1, taken->timestep);
+  double score;
+  cav_status kept = CAV_NOT_CONVERGED,
+             status = at ? cav_sample_fill(taken, &rest, number, at, &score, error) : CAV_NO_MEMORY;
+  int lost = !status;
+  *solution = NULL;
+  rest.resume = NULL;
+  rest.diagnose = 0; // what is least violated stands still
+  for (int i = 0; i < WAYS && lost; i++) {
+    cav_solution *found = NULL;
+    rest.first_stage = from[i];
+    status = cav_solve_after(taken, &rest, at, *solution, &found, error);
+    lost = status == CAV_NOT_CONVERGED || (!status && found->cost > score);
+    const int worse = kept == CAV_OK && lost && (status || found->cost >= (*solution)->cost);
+    if (worse || !found) {
+      cav_solution_free(found);
+    } else {
+      cav_solution_free(*solution);
+      *solution = found, kept = status;
+    }
+  }
+  cav_trajectory_free(at);
+  return *solution && (!status || status == CAV_NOT_CONVERGED) ? kept : status;
+}
+
 cav_status cav_strategy_solve(const cav_problem *problem, const cav_strategy *strategy,
                               const cav_solve_options *options, const cav_trajectory *start, cav_solution **solution,
                               cav_error *error) {
   cav_problem taken;
   cav_strategy_apply(problem, strategy, &taken);
   if (strategy->hand && !start) return solve_pushed(&taken, strategy->hand, options, solution, error);
+  if (strategy->samples && !start) return solve_sampled(&taken, strategy->samples, options, solution, error);
   if (strategy->nreach && !start) return solve_reached(&taken, strategy, options, solution, error);
   const cav_checkpoint *resume = options ? options->resume : NULL;
   int second = resume && resume->order == strategy->order;
