@@ -247,11 +247,10 @@ static void check_order(cav_problem *p) {
   cav_strategy strategy[CAV_STRATEGIES];
   int n;
   p->order = CAV_ORDER_MOMENTUM;
-  CHECK(offers(
-      p,
-      "stated near-1 near-2 near-3 near-4 midpoint posture sample near-5 near-6 resample near-7 near-8 soft hold "
-      "slow near-9 near-10 near-11 near-12 repair-1 repair-2 repair-3 "
-      "repair-4 open longer stronger"));
+  CHECK(offers(p,
+               "stated near-1 near-2 near-3 near-4 midpoint posture sample near-5 near-6 soft hold "
+               "slow resample near-7 near-8 near-9 near-10 near-11 near-12 repair-1 repair-2 repair-3 "
+               "repair-4 open longer stronger"));
   CHECK(cav_strategy_list(p, strategy, &n) == CAV_OK);
   cav_solution *straight = NULL, *round = NULL;
   runs = first_stall = last_stall = 0;

@@ -40,6 +40,9 @@ enum {
   MEND_LAST = 4
 };
 
+/// Dofs up to which sampling takes less time than another solve.
+enum { TINY = 5 };
+
 /// What the duration of a diagnosis costs, 1/s², so that it is not far from the shortest.
 static const double haste = 100;
 
@@ -270,15 +273,11 @@ static cav_status add_pumped(const cav_problem *problem, cav_strategy *strategy,
   return status;
 }
 
-/// From the best of many simulated motions, where a model is small enough for that.
-static void add_sampled(const cav_problem *problem, cav_strategy *strategy, int *n) {
-  static const char *const name[] = {"sample", "resample"};
-  cav_strategy sampled = {.order = problem->order, .schedule = problem->schedule};
+/// From the best of many simulated motions, where a model is small enough for that. number: of their draws.
+static void add_sampled(const cav_problem *problem, cav_strategy *strategy, int *n, int number) {
+  cav_strategy sampled = {.samples = number, .order = problem->order, .schedule = problem->schedule};
   sampled.text = "from the best of some thousands of simulated motions";
-  for (int i = 0; i < 2 && cav_sample_serves(problem); i++) {
-    sampled.samples = i + 1;
-    add_mended(strategy, n, &sampled, name[i]);
-  }
+  if (cav_sample_serves(problem)) add_mended(strategy, n, &sampled, number == 1 ? "sample" : "resample");
 }
 
 /// With hands brought first to what has to be pushed, carried or touched: both of what stands on a free base, or else one.
@@ -445,9 +444,12 @@ cav_status cav_strategy_list(const cav_problem *problem, cav_strategy strategy[C
   if (status == CAV_OK && !cav_upright_held(problem)) status = add_upright(problem, strategy, n, &stated);
   if (status == CAV_OK) status = add_posture(problem, strategy, n, &stated);
   if (status == CAV_OK) status = add_pumped(problem, strategy, n, &swings_up);
-  if (status == CAV_OK) add_sampled(problem, strategy, n);
+  // what simulates in no time sooner than others are solved
+  const int tiny = problem->model->nv <= TINY;
+  if (status == CAV_OK && tiny) add_sampled(problem, strategy, n, 1);
   if (status == CAV_OK) status = add_others(problem, strategy, n, &g);
   if (status != CAV_OK) return status;
+  for (int number = tiny ? 2 : 1; number <= 2; number++) add_sampled(problem, strategy, n, number);
   begin_upright(strategy, *n);
   add_last(problem, strategy, n, &g);
   // what a swing-up takes is told by cav_problem_pumping
