@@ -100,9 +100,8 @@ static void test_solve(const cav_problem *p, double score) {
   const cav_solve_options options = cav_solve_options_default();
   cav_strategy offered;
   cav_solution *solution = NULL;
-  cav_error error = {0};
   if (!CHECK(is_offered(p, &offered) && offered.samples == 1)) return;
-  CHECK(cav_strategy_solve(p, &offered, &options, NULL, &solution, &error) == CAV_OK);
+  CHECK(cav_strategy_solve(p, &offered, &options, NULL, &solution, NULL) == CAV_OK);
   if (CHECK(solution != NULL)) {
     const cav_trajectory *end = solution->trajectory;
     CHECK(solution->unactuated < 1e-6 && solution->cost <= score);

@@ -361,14 +361,16 @@ static cav_status race(sampler *s) {
 cav_status cav_sample_fill(const cav_problem *problem, const cav_solve_options *options, int number, cav_trajectory *at,
                            double *score, cav_error *error) {
   sampler s;
-  cav_status status = open_all(&s, problem, options, error);
+  cav_error refused = {0};
+  cav_status status = open_all(&s, problem, options, &refused);
   for (int k = 0; k < SEARCHES; k++) s.search[k].state = ((uint64_t)number << 32) + ((uint64_t)k << 16);
   if (!status) status = measure(&s);
   if (!status) status = race(&s);
   for (int i = 0; status == CAV_BAD_INPUT && s.team && i < cav_parallel_size(s.team); i++) {
     const cav_transcription *tr = s.member[i].tr;
-    if (tr && tr->failure.status == CAV_BAD_INPUT) *error = tr->failure;
+    if (tr && tr->failure.status == CAV_BAD_INPUT) refused = tr->failure;
   }
+  if (error && refused.status) *error = refused;
   *score = INFINITY;
   if (!status && isfinite(s.search[0].score[0])) status = simulate(&s, &s.member[0], s.search[0].best, score);
   if (!status && !isfinite(*score)) status = CAV_NOT_CONVERGED;
