@@ -153,12 +153,12 @@ static void test_end(void) {
   for (int i = 0; i < 2; i++) {
     asked = 0;
     options.stop_context = (void *)&after[i];
-    CHECK(fill(p, &options, 1, at, &score) == (i == 0 ? CAV_NOT_CONVERGED : CAV_OK));
+    CHECK(fill(p, &options, 1, at, &score) == (i == 0 ? CAV_INTERRUPTED : CAV_OK));
     CHECK(asked <= after[i] + 60 && isfinite(score) == (i == 1));
   }
   options.stop = NULL;
   options.max_seconds = 1e-3;
-  CHECK(fill(p, &options, 1, at, &score) == CAV_NOT_CONVERGED);
+  CHECK(fill(p, &options, 1, at, &score) == CAV_INTERRUPTED);
   cav_trajectory_free(at);
   cav_problem_free(p);
 }

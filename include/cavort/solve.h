@@ -410,7 +410,8 @@ CAV_API void cav_strategy_apply(const cav_problem *problem, const cav_strategy *
 
 /// Solves by a strategy: cav_solve of what cav_strategy_apply gives, after one under the midpoint order, or after some with
 /// a hand at what has to be pushed, where the strategy says so, whose iterations and seconds are counted but whose log is not
-/// kept. A repair that has a start goes on from there, with the last stages of its schedule alone.
+/// kept; from the best of simulated motions, where it says that. A repair that has a start goes on from there, with the last
+/// stages of its schedule alone.
 CAV_API cav_status cav_strategy_solve(const cav_problem *problem, const cav_strategy *strategy,
                                       const cav_solve_options *options, const cav_trajectory *start,
                                       cav_solution **solution, cav_error *error);

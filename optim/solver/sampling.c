@@ -373,7 +373,7 @@ cav_status cav_sample_fill(const cav_problem *problem, const cav_solve_options *
   if (error && refused.status) *error = refused;
   *score = INFINITY;
   if (!status && isfinite(s.search[0].score[0])) status = simulate(&s, &s.member[0], s.search[0].best, score);
-  if (!status && !isfinite(*score)) status = CAV_NOT_CONVERGED;
+  if (!status && !isfinite(*score)) status = s.ended ? CAV_INTERRUPTED : CAV_NOT_CONVERGED;
   if (!status) {
     const cav_trajectory *from = s.member[0].at;
     assert(at->nknot == from->nknot && at->nq == from->nq && at->nv == from->nv);
