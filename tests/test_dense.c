@@ -222,7 +222,7 @@ static void check_capsules(void) {
     for (int way = 0; way < 2; way++) {
       lanes_most = way ? 8 : 2;
       memset(&m, 0, sizeof m);
-      cav_manifolds_start(&m, 0, 0.5, 0.2);
+      cav_manifolds_start(&m, 0, 0.5, 0.2, NULL);
       m.a = a, m.b = b;
       found[way] = cav_touch_rates(&m, point, 0, &here[way], rate[way]);
     }

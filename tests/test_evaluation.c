@@ -1,5 +1,6 @@
 /// Evaluations put by: what a state has back is what cav_inverse leaves there, to the bit, derivatives and readings with it; and
-/// only at the same point under the same options. A linearisation after values at the same motion evaluates nothing.
+/// only at the same point under the same options; searches from where they ended in a posture change nothing.
+/// A linearisation after values at the same motion evaluates nothing.
 #include "cavort/cavort.h"
 #include "continuation.h"
 #include "evaluation.h"
@@ -134,8 +135,52 @@ static void test_linearise(void) {
   cav_problem_free(p);
 }
 
+/// Postures gone through three times over, with what each search for contacts of meshes ended at kept by posture and by the state
+/// alone: the same bits.
+static void test_hints(void) {
+  static const char scene[] =
+      "<mujoco><option timestep='0.01'/><asset><mesh name='m' vertex='-.1 -.1 -.1 .1 -.1 -.1 0 .1 -.1 .05 .02 .1 -.04 "
+      ".03 "
+      ".12 0 -.06 .11'/></asset><worldbody><geom type='box' size='1 1 .1' pos='0 0 -.1'/>"
+      "<body pos='0 0 .1'><freejoint/><geom type='mesh' mesh='m' mass='1'/></body>"
+      "<body pos='.15 0 .25'><freejoint/><geom type='mesh' mesh='m' mass='1'/></body></worldbody></mujoco>";
+  enum { POSTURES = 8 };
+  static double fresh[4000], back[4000];
+  cav_model *m = scene_load(scene);
+  if (!CHECK(m != NULL)) return;
+  cav_state *alone = cav_state_new(m), *by_turns = cav_state_new(m);
+  struct cav_hint *hints[POSTURES] = {NULL};
+  point p[POSTURES];
+  int contacts = 0;
+  for (int i = 0; i < POSTURES; i++) p[i] = make_point(m, 0.1);
+  for (int turn = 0; turn < 3 * POSTURES; turn++) {
+    const point *at = &p[turn % POSTURES];
+    double u[32];
+    CHECK(cav_inverse(m, alone, at->q, at->v, at->v_next, u) == CAV_OK);
+    contacts += alone->ncontact;
+    size_t n = print(m, alone, fresh);
+    cav_evaluation_swap_hints(by_turns, &hints[turn % POSTURES]);
+    CHECK(cav_inverse(m, by_turns, at->q, at->v, at->v_next, u) == CAV_OK);
+    CHECK(print(m, by_turns, back) == n && !memcmp(fresh, back, n * sizeof *fresh));
+    cav_evaluation_swap_hints(by_turns, &hints[turn % POSTURES]);
+  }
+  CHECK(contacts > 3 * POSTURES);
+  for (int i = 0; i < POSTURES; i++) CHECK(hints[i] != NULL), free(hints[i]);
+  cav_state_free(alone), cav_state_free(by_turns);
+  cav_model_free(m);
+  // without a mesh there is nothing to keep
+  struct cav_hint *none = NULL;
+  m = scene_load(scene_linkage);
+  alone = m ? cav_state_new(m) : NULL;
+  if (alone) cav_evaluation_swap_hints(alone, &none);
+  CHECK(alone && !none);
+  cav_state_free(alone);
+  cav_model_free(m);
+}
+
 int main(void) {
   for (int order = 0; order < 3; order++) test_state((cav_order)order);
   test_linearise();
+  test_hints();
   return check_result();
 }

@@ -264,6 +264,56 @@ static void test_wide_face(void) {
   }
 }
 
+// over a side of a box a corner of a mesh is proven to be nearest from whichever three of the side's corners the hint has, by the
+// height above that side
+static void test_side_of_box(void) {
+  int proven = 0;
+  for (int k = 0; k < POSES; k++) {
+    solid a, b;
+    random_solid(CAV_GEOM_BOX, 0, &a);
+    random_solid(CAV_GEOM_MESH, 0, &b);
+    // its lowest corner over a side, turned anyhow
+    double n[3], x[3], back[3], over[3], along[3];
+    column3(n, a.shape.rotation, k % 3);
+    if (k % 2) scale3(n, -1, n);
+    scale3(back, -1, n);
+    cav_shape_support(&b.shape, back, x);
+    axpy3(over, a.shape.pos, a.size[k % 3] + uniform(0.001, 0.02), n);
+    for (int way = 1; way < 3; way++) {
+      column3(along, a.shape.rotation, (k + way) % 3);
+      axpy3(over, over, uniform(-0.9, 0.9) * a.size[(k + way) % 3], along);
+    }
+    sub3(over, over, x);
+    add3(b.shape.pos, b.shape.pos, over);
+    cav_touch first[CAV_TOUCH_MAX], again[CAV_TOUCH_MAX];
+    cav_hint hint = {.na = 0};
+    const int found = cav_collide_again(&a.shape, &b.shape, MARGIN, &hint, first);
+    // but where two corners are as low
+    CHECK(found);
+    if (hint.na != 3 || hint.nb != 1) {
+      let_go(&a), let_go(&b);
+      continue;
+    }
+    // its four corners in four ways
+    const int differ = (hint.a[0] ^ hint.a[1]) | (hint.a[0] ^ hint.a[2]), fixed = hint.a[0] & ~differ;
+    const int k1 = differ & -differ, corner[4] = {fixed, fixed | k1, fixed | (differ - k1), fixed | differ};
+    for (int left = 0; left < 4; left++) {
+      cav_hint other = hint;
+      for (int i = 0, at = 0; i < 4; i++)
+        if (i != left) other.a[at++] = corner[i];
+      const int n_again = cav_collide_again(&a.shape, &b.shape, MARGIN, &other, again);
+      CHECK(n_again == found && !memcmp(first, again, (size_t)found * sizeof *first));
+      proven += other.na == 3;
+    }
+    cav_touch anew[CAV_TOUCH_MAX];
+    CHECK(cav_collide_shapes(&a.shape, &b.shape, MARGIN, anew) == found);
+    CHECK_NEAR(first->dist, anew->dist, 1e-14);
+    let_go(&a), let_go(&b);
+  }
+  printf("over a side of a box: %d of %d proven from other corners of it\n", proven, 4 * POSES);
+  CHECK(proven > 0.99 * 4 * POSES);
+}
+
 // --- height fields ---
 
 static cav_shape level_field(const cav_hfield *h) {
@@ -770,6 +820,7 @@ int main(void) {
   test_derivatives();
   test_degenerate();
   test_wide_face();
+  test_side_of_box();
   test_level(0);
   test_level(1e-11);
   test_hills();

@@ -339,6 +339,10 @@ int cav_contacts_narrow(const cav_state *state) {
 
 int cav_contacts_have_meshes(const cav_state *state) { return state->work->geom && state->work->geom->hint; }
 
+cav_hint **cav_contacts_hints(const cav_state *state) {
+  return cav_contacts_have_meshes(state) ? &state->work->geom->hint : NULL;
+}
+
 // the geom as a shape, its rotation formed at the first request
 static const cav_shape *shape_of(const cav_state *state, struct cav_geom_cache *cache, int i) {
   if (!cache->slot[i].turned) refresh_rotation(state, cache, i);

@@ -22,6 +22,10 @@ int cav_contacts_narrow(const cav_state *state);
 /// Whether a pair of the state's model has a mesh. collide.c.
 int cav_contacts_have_meshes(const cav_state *state);
 
+/// Where the state's searches of pairs with a mesh ended, [npair]; another array of these may take its place, which the state
+/// then owns. NULL: it has no such pair. collide.c.
+cav_hint **cav_contacts_hints(const cav_state *state);
+
 /// Broad and narrow phase over model->pair at the state's poses: fills pair, feature, dim, links, pos, frame, dist,
 /// margin, friction of state->contact and ncontact. collide.c. The activation distance of a pair is its margin, or
 /// where the smoothed law is active (cav_contact_activation), whichever is larger.

@@ -157,7 +157,7 @@ static int is_distance(const cav_geom *first, const cav_geom *second, int featur
 
 // the same of a point over a face of one of two bodies; 0: it is none
 static int over_face(const cav_contact *c, cav_pair_manifolds *m, cav_next_contact *out) {
-  if (m->faces < 0) m->faces = cav_face_points(&m->a, &m->b, out->margin, m->face);
+  if (m->faces < 0) m->faces = cav_face_points(&m->a, &m->b, out->margin, m->hint, m->face);
   int i = 0;
   while (i < m->faces && m->face[i].feature != c->feature) i++;
   if (i == m->faces) return 0;
@@ -190,7 +190,8 @@ static void fill_gradient(const cav_model *model, const cav_state *state, const 
   if (out->by_next == 0 || is_distance(first, second, c->feature)) return;
   if (cav_pair_has_mesh(model, pair) && is_idle(state, c)) return;
   if (m->pair != c->pair || m->margin < out->margin) {
-    cav_manifolds_start(m, c->pair, fmin(1, fmin(first->bound, second->bound)), out->margin);
+    cav_manifolds_start(m, c->pair, fmin(1, fmin(first->bound, second->bound)), out->margin,
+                        cav_pair_has_mesh(model, pair) ? &state->work->next->hint[c->pair] : NULL);
     place(model, state->work->next->link, first, &m->a);
     place(model, state->work->next->link, second, &m->b);
   }

@@ -155,17 +155,20 @@ static int solve_two(const double a[2], const double b[2], const double r[2], do
 }
 
 // the separation of two shapes and what of both meets; 0 where that is not known. A curved shape is the first
-static int find_parts(const cav_contact *c, const cav_shape *a, const cav_shape *b, double size, cav_separation *s,
-                      parts *p) {
+static int find_parts(const cav_contact *c, const cav_shape *a, const cav_shape *b, double size, cav_hint *hint,
+                      cav_separation *s, parts *p) {
   cav_core ca = cav_core_of(a), cb = cav_core_of(b);
   int curved = cav_shape_is_curved(a);
   *p = (parts){.n = 0};
   if (!curved) {
     double most = c->dist + ca.radius + cb.radius + size;
-    return cav_separation_find(&ca, &cb, fmax(cav_shape_size(a), cav_shape_size(b)), most, s) && s->corners &&
-           add_part(p, s->corner_a, s->corners, 0, size) && add_part(p, s->corner_b, s->corners, 1, size);
+    const double large = fmax(cav_shape_size(a), cav_shape_size(b));
+    const int found =
+        hint ? cav_separation_again(&ca, &cb, large, most, hint, s) : cav_separation_find(&ca, &cb, large, most, s);
+    return found && s->corners && add_part(p, s->corner_a, s->corners, 0, size) &&
+           add_part(p, s->corner_b, s->corners, 1, size);
   }
-  if (!cav_separation_solve(a, b, c->dist + size, NULL, s) || !s->corners || s->straight == 2) return 0;
+  if (!cav_separation_solve(a, b, c->dist + size, hint, s) || !s->corners || s->straight == 2) return 0;
   if (s->straight) column3(p->along[p->n++], a->rotation, 2);
   return add_part(p, s->corner_b, s->corners, 1, size);
 }
@@ -199,10 +202,11 @@ static int turn_and_slide(const parts *p, double row[2][2], double G[2][2], cons
 // the nearest points of two bodies: the normal stays square to what both parts contain, and where they contain less
 // than a plane it turns with the line between the points, which on a curved body move with the normal. 0 if the parts do
 // not say how
-static int nearest_points(const cav_contact *c, const cav_shape *a, const cav_shape *b, double size, geometry *g) {
+static int nearest_points(const cav_contact *c, const cav_shape *a, const cav_shape *b, double size, cav_hint *hint,
+                          geometry *g) {
   cav_separation s;
   parts p;
-  if (!find_parts(c, a, b, size, &s, &p)) return 0;
+  if (!find_parts(c, a, b, size, hint, &s, &p)) return 0;
   double radius_a = cav_core_of(a).radius, radius_b = cav_core_of(b).radius;
   // two directions square to the normal: the first part and the one across it
   double t[2][3], row[2][2], H[2][2] = {{0}}, G[2][2];
@@ -285,9 +289,9 @@ static int is_nearest(const cav_contact *c, const cav_shape *a, const cav_shape 
 static int on_prism(const cav_contact *c, cav_pair_manifolds *m, geometry *g) {
   cav_prism prism;
   const int feature = cav_hfield_prism(&m->b, c->feature, &prism);
-  if (feature == 0) return nearest_points(c, &m->a, &prism.shape, m->size, g);
+  if (feature == 0) return nearest_points(c, &m->a, &prism.shape, m->size, NULL, g);
   if (feature < 0) return 0;
-  m->faces = cav_face_points(&m->a, &prism.shape, m->margin, m->face);
+  m->faces = cav_face_points(&m->a, &prism.shape, m->margin, NULL, m->face);
   return m->faces > 0 && face_point(c, feature, m, g);
 }
 
@@ -302,12 +306,19 @@ static void find_alignment(const cav_contact *c, geometry *g) {
   memset(g->tangent, 0, sizeof g->tangent);
 }
 
+// where the last search of a pair with a mesh ended
+static cav_hint *hint_of(const cav_model *model, const cav_state *state, int pair) {
+  cav_hint **hints = cav_contacts_hints(state);
+  return hints && cav_pair_has_mesh(model, &model->pair[pair]) ? *hints + pair : NULL;
+}
+
 static void contact_geometry(const cav_model *model, const cav_state *state, const cav_contact *c,
                              cav_pair_manifolds *m, geometry *g) {
   const cav_pair *pair = &model->pair[c->pair];
   const cav_geom *first = &model->geom[pair->geom1], *second = &model->geom[pair->geom2];
   if (m->pair != c->pair) {
-    cav_manifolds_start(m, c->pair, fmin(1, fmin(first->bound, second->bound)), cav_contact_activation(state, pair));
+    cav_manifolds_start(m, c->pair, fmin(1, fmin(first->bound, second->bound)), cav_contact_activation(state, pair),
+                        hint_of(model, state, c->pair));
     place(model, state, pair->geom1, &m->a);
     place(model, state, pair->geom2, &m->b);
   }
@@ -325,10 +336,10 @@ static void contact_geometry(const cav_model *model, const cav_state *state, con
     return;
   }
   if (second->type == CAV_GEOM_MESH && c->feature > 0 && m->faces < 0)
-    m->faces = cav_face_points(&m->a, &m->b, m->margin, m->face);
+    m->faces = cav_face_points(&m->a, &m->b, m->margin, m->hint, m->face);
   int known = second->type == CAV_GEOM_HFIELD ? on_prism(c, m, g)
               : c->feature > 0                ? m->faces > 0 && face_point(c, c->feature, m, g)
-                               : is_nearest(c, &m->a, &m->b) && nearest_points(c, &m->a, &m->b, m->size, g);
+                               : is_nearest(c, &m->a, &m->b) && nearest_points(c, &m->a, &m->b, m->size, m->hint, g);
   if (!known) {
     // where the points of a pair come and go there is no derivative: one that moves with the second geom over a plane of
     // the first has the right rate of the gap

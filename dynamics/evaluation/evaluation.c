@@ -96,6 +96,16 @@ static int is_plain(const cav_options *o) {
          !cav_looks_ahead(o);
 }
 
+void cav_evaluation_swap_hints(cav_state *state, cav_hint **hints) {
+  cav_hint **own = cav_contacts_hints(state), *found;
+  if (!own) return;
+  if (!*hints) *hints = calloc((size_t)state->model->npair, sizeof **hints);
+  if (!*hints) return;
+  found = *own;
+  *own = *hints;
+  *hints = found;
+}
+
 void cav_evaluation_keep(cav_evaluation **evaluation, cav_state *state, const double *q, const double *v,
                          const double *v_next) {
   const cav_model *model = state->model;

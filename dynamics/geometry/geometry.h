@@ -82,8 +82,9 @@ enum { CAV_FACE_POINTS = 64 };
 void cav_face_point_move(const cav_face_point *p, const double twist[6], const double arm[3], double move[3]);
 
 /// Points over a face as cav_collide_convex makes them, before they are thinned out. 0: there is no face, or a cylinder
-/// stands upright on it. polytope.c.
-int cav_face_points(const cav_shape *a, const cav_shape *b, double margin, cav_face_point point[CAV_FACE_POINTS]);
+/// stands upright on it. hint: where the last search of the two ended, NULL: none is kept. polytope.c.
+int cav_face_points(const cav_shape *a, const cav_shape *b, double margin, cav_hint *hint,
+                    cav_face_point point[CAV_FACE_POINTS]);
 
 /// A prism of a height field as a mesh: its three upper corners counterclockwise, the same below them at its base.
 typedef struct cav_prism {
@@ -102,6 +103,7 @@ typedef struct cav_pair_manifolds {
   int faces; ///< points over a face of one of the two, -1: not looked for
   cav_face_point face[CAV_FACE_POINTS];
   cav_shape a, b;
+  cav_hint *hint;      ///< where the last search of the two ended, NULL: none is kept
   double margin, size; ///< m: reach; size of the smaller shape, of which steps are a fraction
   double point[3];     ///< of the twists
   int count[13];       ///< after -, + each of six unit twists, then as it is
@@ -109,7 +111,7 @@ typedef struct cav_pair_manifolds {
 } cav_pair_manifolds;
 
 /// Takes up a pair whose shapes a and b the caller fills in. touch_rates.c.
-void cav_manifolds_start(cav_pair_manifolds *m, int pair, double size, double margin);
+void cav_manifolds_start(cav_pair_manifolds *m, int pair, double size, double margin, cav_hint *hint);
 
 /// The point with that feature, and its rates by unit twists (angular, linear) of the second shape about a world point.
 /// 0 where the point is not there, or comes and goes within a step. touch_rates.c.

@@ -3,14 +3,17 @@
 /// The direction between two such parts is known in closed form. Points of both that lie inside their parts, one behind
 /// the other along that direction, with every neighbour of a part's corners lower than these by a margin, are the nearest of
 /// the bodies: on a convex body what is higher than all about it is the highest. So the answer depends on the poses
-/// alone, to the bit, whoever guessed. Where a face of a mesh has more corners in one plane than a guess, three of them all
-/// say where it is, always the same. Parts that only just meet, faces of boxes and bodies that overlap are not proven here;
-/// gjk.c searches for these.
+/// alone, to the bit, whoever guessed. Where a face of a mesh or a box has more corners in one plane than a guess, three of
+/// them all say where it is, always the same. Parts that only just meet and bodies that overlap are not proven here; gjk.c
+/// searches for these.
 #include "gjk.h"
 #include "math3.h"
 #include "pairs.h"
 
-enum { LEVEL_MAX = 128 };
+#include <stdint.h>
+#include <string.h>
+
+enum { LEVEL_MAX = 128, SEEN_MAX = 1 << 14 }; // corners of a face, of a mesh: of more nothing is proven
 // fractions of the size: how far neighbours must be lower, how far apart the bodies; of a part: how far inside its ends points
 // lie; sines of what is not parallel
 static const double LOWER = 1e-12, APART = 1e-6, INSIDE = 1e-9, SQUARE = 1e-3;
@@ -209,26 +212,28 @@ static int from_corners(double p[3][3], int na, double q[3][3], int nb, double x
 // the corners of a mesh that are level with three along a direction in its axes and joined to them, in order; 0: one is
 // higher, or they are too many
 static int level_with(const cav_mesh *m, const double local[3], const int corner[3], double margin, int *level) {
+  uint64_t seen[SEEN_MAX / 64];
   double height = dot3(m->vertex + 3 * corner[0], local);
-  int n = 3;
-  memcpy(level, corner, 3 * sizeof *level);
+  int n = 0, words = (m->nvertex + 63) / 64;
+  if (m->nvertex > SEEN_MAX) return 0;
+  memset(seen, 0, (size_t)words * sizeof *seen);
+  for (; n < 3; n++) {
+    level[n] = corner[n];
+    seen[corner[n] / 64] |= UINT64_C(1) << corner[n] % 64;
+  }
   for (int i = 0; i < n; i++) {
     for (int k = m->neighbour_start[level[i]]; k < m->neighbour_start[level[i] + 1]; k++) {
-      int v = m->neighbour[k], known = 0;
+      int v = m->neighbour[k];
       double h = dot3(m->vertex + 3 * v, local);
-      if (h < height - margin) continue;
-      for (int j = 0; j < n; j++) known |= level[j] == v;
-      if (known) continue;
+      if (h < height - margin || seen[v / 64] >> v % 64 & 1) continue;
       if (h > height + margin || n == LEVEL_MAX) return 0;
+      seen[v / 64] |= UINT64_C(1) << v % 64;
       level[n++] = v;
     }
   }
-  for (int i = 1; i < n; i++) {
-    for (int k = i; k > 0 && level[k] < level[k - 1]; k--) {
-      int later = level[k - 1];
-      level[k - 1] = level[k];
-      level[k] = later;
-    }
+  n = 0;
+  for (int w = 0; w < words; w++) {
+    for (uint64_t left = seen[w]; left; left &= left - 1) level[n++] = 64 * w + __builtin_ctzll(left);
   }
   return n;
 }
@@ -237,29 +242,48 @@ static int level_with(const cav_mesh *m, const double local[3], const int corner
 // furthest from their line
 static void span_of(const cav_mesh *m, const int *level, int n, int best[3]) {
   const double *first = m->vertex + 3 * level[0];
-  double e[3] = {0, 0, 0}, d[3], c[3];
+  double e[3], d[3], c[3], most[2] = {-1, -1};
   best[0] = level[0];
-  for (int part = 1; part < 3; part++) {
-    double most = -1;
-    for (int i = 1; i < n; i++) {
-      sub3(d, m->vertex + 3 * level[i], first);
-      cross3(c, e, d);
-      double far = part == 1 ? dot3(d, d) : dot3(c, c);
-      if (far > most) most = far, best[part] = level[i];
-    }
-    sub3(e, m->vertex + 3 * best[part], first);
+  for (int i = 1; i < n; i++) {
+    sub3(d, m->vertex + 3 * level[i], first);
+    const double far = dot3(d, d);
+    if (far > most[0]) most[0] = far, best[1] = level[i];
+  }
+  sub3(e, m->vertex + 3 * best[1], first);
+  for (int i = 1; i < n; i++) {
+    sub3(d, m->vertex + 3 * level[i], first);
+    cross3(c, e, d);
+    const double far = dot3(c, c);
+    if (far > most[1]) most[1] = far, best[2] = level[i];
   }
 }
 
-// a corner p of one body and three corners of a mesh, the highest along a direction, but for more in their plane: on that plane
+// three corners of the side of a box that three are of, always the same; 0: it is not highest along a direction in the box's axes
+static int side_of(const cav_shape *s, const double local[3], const int corner[3], double margin, int best[3]) {
+  // corners of a side differ along two axes
+  const int differ = (corner[0] ^ corner[1]) | (corner[0] ^ corner[2]);
+  const int axis = !(differ & 1) ? 0 : !(differ & 2) ? 1 : 2, side = corner[0] & 1 << axis;
+  if (differ == 7 || !(2 * s->size[axis] * (side ? local[axis] : -local[axis]) >= margin)) return 0;
+  best[0] = side;
+  best[1] = side | 1 << (axis + 1) % 3;
+  best[2] = side | 1 << (axis + 2) % 3;
+  return 1;
+}
+
+// a corner p of one body and three corners of a mesh or a box, the highest along a direction, but for more in their plane: on
+// that plane
 static int on_level(const double p[3], const cav_shape *s, const double towards[3], const int corner[3], double margin,
                     double on[3], double n[3]) {
   double local[3], q[3][3];
   int level[LEVEL_MAX], best[3];
   rotate_back(local, s->rotation, towards);
-  int count = level_with(s->mesh, local, corner, margin, level);
-  if (!count) return 0;
-  span_of(s->mesh, level, count, best);
+  if (s->type == CAV_GEOM_BOX) {
+    if (!side_of(s, local, corner, margin, best)) return 0;
+  } else {
+    int count = s->type == CAV_GEOM_MESH ? level_with(s->mesh, local, corner, margin, level) : 0;
+    if (!count) return 0;
+    span_of(s->mesh, level, count, best);
+  }
   for (int k = 0; k < 3; k++) cav_shape_corner(s, best[k], q[k]);
   return from_triangle(p, q, 0, on, n) && normalise3(n) > 0;
 }
@@ -280,11 +304,9 @@ int cav_nearest_prove(const cav_core *a, const cav_core *b, double size, const c
   scale3(back, -1, n);
   if (!(gap > APART * size)) return 0;
   int top_a = curved || is_top(a, n, hint->a, na, LOWER * size), top_b = is_top(b, back, hint->b, nb, LOWER * size);
-  if (!top_b && (!top_a || curved || nb < 3 || b->shape->type != CAV_GEOM_MESH ||
-                 !on_level(x, b->shape, back, hint->b, LOWER * size, y, n)))
-    return 0;
+  if (!top_b && (!top_a || curved || nb < 3 || !on_level(x, b->shape, back, hint->b, LOWER * size, y, n))) return 0;
   if (!top_a) {
-    if (na < 3 || a->shape->type != CAV_GEOM_MESH || !on_level(y, a->shape, n, hint->a, LOWER * size, x, n)) return 0;
+    if (na < 3 || !on_level(y, a->shape, n, hint->a, LOWER * size, x, n)) return 0;
     scale3(n, -1, n);
   }
   sub3(d, y, x);

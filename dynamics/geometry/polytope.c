@@ -436,11 +436,12 @@ static double fraction_of(const double x[3], const double from[3], const double 
   return length2 > 0 ? dot3(d, e) / length2 : 0;
 }
 
-int cav_face_points(const cav_shape *a, const cav_shape *b, double margin, cav_face_point point[CAV_FACE_POINTS]) {
+int cav_face_points(const cav_shape *a, const cav_shape *b, double margin, cav_hint *hint,
+                    cav_face_point point[CAV_FACE_POINTS]) {
   contact_pair g = {a, b, -1, -1, .size = fmax(cav_shape_size(a), cav_shape_size(b)), .margin = margin};
   standing s;
   cav_outline whole;
-  if (!cav_separation_solve(a, b, margin, NULL, &g.separation) || !stand(&g, &s)) return 0;
+  if (!cav_separation_solve(a, b, margin, hint, &g.separation) || !stand(&g, &s)) return 0;
   double roll[3][3] = {{0}}, turning[3] = {0};
   if (s.other->type == CAV_GEOM_CYLINDER && !rolling(s.other, s.m, roll, turning)) return 0;
   lying_on(s.other, s.m, -1, &whole);

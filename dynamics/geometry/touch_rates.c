@@ -33,12 +33,13 @@ static const cav_touch *find(const cav_touch *touch, int count, int feature) {
   return NULL;
 }
 
-void cav_manifolds_start(cav_pair_manifolds *m, int pair, double size, double margin) {
+void cav_manifolds_start(cav_pair_manifolds *m, int pair, double size, double margin, cav_hint *hint) {
   m->pair = pair;
   m->displaced = 0;
   m->faces = -1;
   m->size = size;
   m->margin = margin;
+  m->hint = hint;
 }
 
 // step k of the twelve: the one before a unit twist, then the one after it

@@ -347,6 +347,7 @@ void cav_transcription_free(cav_transcription *tr) {
     free(k->dense), free(k->rest), free(k->moving);
     cav_kept_free(k->kept);
     cav_evaluation_free(k->evaluation);
+    free(k->hints);
   }
   for (int i = 0; tr->scratch && i < cav_parallel_size(tr->pool); i++) {
     cav_scratch *s = &tr->scratch[i];
@@ -526,7 +527,11 @@ static cav_status evaluate_knot(const pass *p, cav_scratch *s, int t) {
 
 static void evaluate_item(void *context, int t, int member) {
   const pass *p = context;
-  p->status[t] = evaluate_knot(p, &p->tr->scratch[member], t);
+  cav_scratch *s = &p->tr->scratch[member];
+  cav_knot *knot = &p->tr->knot[t];
+  cav_evaluation_swap_hints(s->state, &knot->hints);
+  p->status[t] = evaluate_knot(p, s, t);
+  cav_evaluation_swap_hints(s->state, &knot->hints);
 }
 
 static void evaluate_within(void *context, int item, int member) {

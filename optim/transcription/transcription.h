@@ -104,6 +104,7 @@ typedef struct cav_knot {
       *absolute; ///< [nabsolute] of the rows with an absolute norm that are not of contacts, in their order; where
                  ///< nabsolute is 0 their Hessian is that of the squares that stand for them
   struct cav_kept *kept;      ///< values put by; NULL: none yet
+  struct cav_hint *hints;     ///< where searches for contacts of meshes ended there; NULL: none yet
   cav_evaluation *evaluation; ///< of the last values, unless it has been linearised since; NULL: none yet
 } cav_knot;
 
