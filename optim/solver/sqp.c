@@ -118,6 +118,7 @@ typedef struct descent {
   double gain;                   ///< decrease of the step that was taken
   double asked;                  ///< what may be left to be saved, of the cost
   double near;                   ///< what is next to nothing; 0 on the way, where a law is left soon in any case
+  int judges;                    ///< 1: it is still to be asked whether a certificate would refuse the motion
   int patient;                   ///< 1: being stuck is no end, unless little is left
   cav_trajectory *second, *best; ///< corrected trial; best of those tried
   cav_trajectory *held;          ///< last motion whose rows held, or nearly; NULL: none did
@@ -616,15 +617,29 @@ static cav_status hold(const cav_solve_run *run, descent *d) {
   return d->held ? CAV_OK : CAV_NO_MEMORY;
 }
 
+/// Rows brought in where the motion stands, and kept if they hold there.
+static cav_status settle_here(cav_solve_run *run, descent *d) {
+  cav_status status = settle_rows(run, d);
+  return status == CAV_OK ? hold(run, d) : status;
+}
+
 /// Of a run that is stopped the last motion whose rows held; where there is time, and gains are asked for, the last one, if its
-/// rows can be brought in.
+/// rows can be brought in, or else the last one whose rows nearly held.
 static cav_status leave(cav_solve_run *run, descent *d) {
   run->ending = run->soon && !run->at_once && run->options->gains;
-  if (run->ending && cav_quadratic_length(d->qp) > 0 && cav_transcription_values(run->tr, run->at) == CAV_OK &&
-      settle_rows(run, d) == CAV_OK && hold(run, d) == CAV_NO_MEMORY)
-    return CAV_NO_MEMORY;
+  cav_status status = CAV_OK;
+  if (run->ending && cav_quadratic_length(d->qp) > 0) {
+    status = cav_transcription_values(run->tr, run->at);
+    if (status == CAV_OK) status = settle_here(run, d);
+    if (status == CAV_OK && d->held && !d->holds) {
+      double saving;
+      cav_run_exchange(&run->at, &d->held);
+      status = foresee(run, d, &saving);
+      if (status == CAV_OK) status = settle_here(run, d);
+    }
+  }
   if (d->held && d->holds) cav_run_exchange(&run->at, &d->held);
-  return CAV_INTERRUPTED;
+  return status == CAV_NO_MEMORY ? status : CAV_INTERRUPTED;
 }
 
 /// Where a run ends beside its rows: back to where they held, if that costs little, and by the metric of there.
@@ -638,6 +653,22 @@ static cav_status go_back(cav_solve_run *run, descent *d) {
   return status == CAV_OK ? settle_rows(run, d) : status;
 }
 
+/// Asks once, where rows first nearly hold, whether a certificate would refuse the motion; the run ends there if they come in.
+static cav_status judge(cav_solve_run *run, descent *d) {
+  if (!d->judges || rows_off(run->tr) > nearly) return CAV_OK;
+  d->judges = 0;
+  cav_status status = cav_run_judge(run);
+  if (status != CAV_OK || !run->refused) return status;
+  cav_trajectory *from = cav_trajectory_copy(run->at);
+  if (!from) return CAV_NO_MEMORY;
+  status = settle_rows(run, d);
+  run->refused = cav_run_met(run);
+  if (!run->refused) cav_run_exchange(&run->at, &from);
+  if (status == CAV_OK && !run->refused) status = cav_transcription_values(run->tr, run->at);
+  cav_trajectory_free(from);
+  return status;
+}
+
 /// Iterations to where no step gains, 1, what one may gain is little and is slow to come, 2, or is more and hardly
 /// comes, 3; or 0.
 static cav_status settle(cav_solve_run *run, descent *d, int *left, int *settled) {
@@ -647,13 +678,14 @@ static cav_status settle(cav_solve_run *run, descent *d, int *left, int *settled
   // iterations left to bring rows in by half; 0: they came, or were in
   int away = off > astray ? ASTRAY : off > nearly ? HOPELESS : 0;
   cav_status status = CAV_OK;
-  for (; status == CAV_OK && *left > 0 && calm < PATIENCE && !is_end(d, &end); --*left) {
+  for (; status == CAV_OK && *left > 0 && calm < PATIENCE && !is_end(d, &end) && !run->refused; --*left) {
     status = model(run, d, 0);
     if (status == CAV_OK) status = iterate(run, d, &taken);
     if (status != CAV_OK || !taken) break;
     calm = d->gain < slow * cav_programme_scale(run->tr) ? calm + 1 : 0;
     if (cav_run_report(run, cav_quadratic_length(d->qp), largest_radius(run->tr, d->radius))) status = CAV_INTERRUPTED;
     if (status == CAV_OK) status = hold(run, d);
+    if (status == CAV_OK) status = judge(run, d);
     if (status == CAV_OK) status = look(run, d, &end);
     const int nearer = away && rows_off(run->tr) < 0.5 * off;
     if (nearer) off = rows_off(run->tr), away = off > astray ? ASTRAY : 0;
@@ -711,7 +743,7 @@ static cav_status descend(cav_solve_run *run, descent *d, int *left, int *settle
     cav_trajectory_free(best);
     best = cav_trajectory_copy(run->at);
     status = best ? measure(run, d, ended < 2) : CAV_NO_MEMORY;
-    if (status != CAV_OK || ended >= 2 || run->optimality < optimal || i == LEAPS || *left <= 0) break;
+    if (status != CAV_OK || run->refused || ended >= 2 || run->optimality < optimal || i == LEAPS || *left <= 0) break;
     status = leap(run, d, &taken);
   }
   cav_trajectory_free(best);
@@ -731,6 +763,7 @@ static cav_status run_of(cav_solve_run *run, int *left, double asked, double fra
   d.asked = asked;
   d.near = soft ? 0 : near_end * asked;
   d.patient = !stuck;
+  d.judges = !soft;
   if (status == CAV_OK) begin(run, &d);
   if (status == CAV_OK && cav_run_certifiable(run)) status = hold(run, &d);
   run->measured = 0;

@@ -168,6 +168,8 @@ static cav_status solve(const cav_race *race, int i, const cav_solve_options *gi
   shelf s = {.race = race, .problem = taken, .strategy = i};
   options.stop = asks_for_the_end;
   options.stop_context = (void *)race;
+  // another one is tried after it
+  options.leave_refused = race->n > 1;
   if (race->folder) s.path = cav_store_checkpoint(race->folder, strategy->name);
   if (race->folder && !s.path) return cav_file_fail(error, CAV_NO_MEMORY, 0, "no memory");
   if (s.path) options.keeper = keep, options.keeper_context = &s;

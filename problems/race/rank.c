@@ -118,6 +118,8 @@ static double excess_of(const cav_verdict *v) {
   double most = fmax(over_tolerance(v, &which), depth_of(v));
   if (v->replay_step_max_error > CAV_TOLERANCE_STEP) most = fmax(most, folded);
   double followed = fmin(v->closed_loop_seconds, v->model_contacts_seconds);
+  // one without gains was left before they were chosen
+  if (!(followed > 0)) return most;
   return fmax(most, v->duration / fmax(followed, v->duration / 100));
 }
 
