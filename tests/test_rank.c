@@ -211,6 +211,12 @@ static void test_nearer(void) {
   CHECK(cav_rank_nearer(&one, &other) && !cav_rank_nearer(&other, &one));
   other.verdict.nmissed = 1;
   CHECK(!cav_rank_nearer(&one, &other) && cav_rank_nearer(&other, &one));
+  // what was left before gains were chosen is not taken for one that is lost at once
+  cav_race_report left = whole(), lost = whole();
+  left.verdict.certified = lost.verdict.certified = 0;
+  left.verdict.slip_mean_m_s = 2 * CAV_TOLERANCE_SLIP, lost.verdict.slip_mean_m_s = 3 * CAV_TOLERANCE_SLIP;
+  left.verdict.closed_loop_seconds = left.verdict.model_contacts_seconds = 0;
+  CHECK(cav_rank_nearer(&left, &lost) && !cav_rank_nearer(&lost, &left));
   // what is not certified comes after them
   other.verdict.certified = 0, other.verdict.slip_mean_m_s = 2 * CAV_TOLERANCE_SLIP;
   CHECK(cav_rank_nearer(&one, &other) && !cav_rank_nearer(&other, &one));
