@@ -21,7 +21,7 @@ typedef struct cav_solve_run {
   cav_begin begin_with;         ///< what the first stage began with
   int warm;                     ///< the rows' final multipliers are those to start from
   int checks_raises;            ///< penalties that grow for nothing are taken back, as near a record
-  int refused;                  ///< no certificate is in sight, and the options leave such a motion: cav_run_judge
+  int refused;                  ///< no certificate is in sight, and the options leave such a motion: cav_run_screen
   int measured;                 ///< optimality and the rows' multipliers are those of at
   double optimality;            ///< predicted decrease of the cost over the cost
   cav_status failed;            ///< what went wrong in the report, CAV_OK: nothing
@@ -86,7 +86,7 @@ int cav_run_certifiable(const cav_solve_run *run);
 
 /// Whether a certificate would refuse the motion by more than polish mends, into run->refused: where the options leave such ones,
 /// and its rows nearly hold. CAV_NO_MEMORY. solution.c.
-cav_status cav_run_judge(cav_solve_run *run);
+cav_status cav_run_screen(cav_solve_run *run);
 
 /// Whether efforts and ranges are within what is planned with, as a certificate asks.
 int cav_run_within_limits(const cav_solve_run *run);

@@ -56,7 +56,7 @@ static cav_status descend(cav_solve_run *run) {
   int left = ITERATIONS, stuck = 0, stages = run->problem->schedule.stages,
       alone = stages < 2 || run->options->first_stage > stages;
   cav_status status = cav_sqp(run, &left, alone ? NULL : &stuck);
-  if (status == CAV_OK && stuck && !run->refused) status = cav_run_judge(run);
+  if (status == CAV_OK && stuck && !run->refused) status = cav_run_screen(run);
   if (run->refused) return status;
   int rest = left;
   double cost = cav_transcription_cost(run->tr);

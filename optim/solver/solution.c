@@ -104,10 +104,10 @@ static cav_status find_rows(cav_solve_run *run) {
   return cav_transcription_rows(run->tr, allowed, &run->solution->row, &run->solution->nrow);
 }
 
-/// Times its tolerance from which on what a motion misses is not met by polish: of the 70 motions of METHOD.md, 7, none was.
+/// Times its tolerance from which on what a motion misses is not met by polish (METHOD.md, 7).
 static const double beyond_polish = 1.5;
 
-cav_status cav_run_judge(cav_solve_run *run) {
+cav_status cav_run_screen(cav_solve_run *run) {
   cav_verdict v = {0};
   cav_error ignored = {0};
   if (!run->options->leave_refused) return CAV_OK;

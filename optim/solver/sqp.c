@@ -118,7 +118,7 @@ typedef struct descent {
   double gain;                   ///< decrease of the step that was taken
   double asked;                  ///< what may be left to be saved, of the cost
   double near;                   ///< what is next to nothing; 0 on the way, where a law is left soon in any case
-  int judges;                    ///< 1: it is still to be asked whether a certificate would refuse the motion
+  int screens;                   ///< 1: it is still to be asked whether a certificate would refuse the motion
   int patient;                   ///< 1: being stuck is no end, unless little is left
   cav_trajectory *second, *best; ///< corrected trial; best of those tried
   cav_trajectory *held;          ///< last motion whose rows held, or nearly; NULL: none did
@@ -654,10 +654,10 @@ static cav_status go_back(cav_solve_run *run, descent *d) {
 }
 
 /// Asks once, where rows first nearly hold, whether a certificate would refuse the motion; the run ends there if they come in.
-static cav_status judge(cav_solve_run *run, descent *d) {
-  if (!d->judges || rows_off(run->tr) > nearly) return CAV_OK;
-  d->judges = 0;
-  cav_status status = cav_run_judge(run);
+static cav_status screen(cav_solve_run *run, descent *d) {
+  if (!d->screens || rows_off(run->tr) > nearly) return CAV_OK;
+  d->screens = 0;
+  cav_status status = cav_run_screen(run);
   if (status != CAV_OK || !run->refused) return status;
   cav_trajectory *from = cav_trajectory_copy(run->at);
   if (!from) return CAV_NO_MEMORY;
@@ -685,7 +685,7 @@ static cav_status settle(cav_solve_run *run, descent *d, int *left, int *settled
     calm = d->gain < slow * cav_programme_scale(run->tr) ? calm + 1 : 0;
     if (cav_run_report(run, cav_quadratic_length(d->qp), largest_radius(run->tr, d->radius))) status = CAV_INTERRUPTED;
     if (status == CAV_OK) status = hold(run, d);
-    if (status == CAV_OK) status = judge(run, d);
+    if (status == CAV_OK) status = screen(run, d);
     if (status == CAV_OK) status = look(run, d, &end);
     const int nearer = away && rows_off(run->tr) < 0.5 * off;
     if (nearer) off = rows_off(run->tr), away = off > astray ? ASTRAY : 0;
@@ -763,7 +763,7 @@ static cav_status run_of(cav_solve_run *run, int *left, double asked, double fra
   d.asked = asked;
   d.near = soft ? 0 : near_end * asked;
   d.patient = !stuck;
-  d.judges = !soft;
+  d.screens = !soft;
   if (status == CAV_OK) begin(run, &d);
   if (status == CAV_OK && cav_run_certifiable(run)) status = hold(run, &d);
   run->measured = 0;
