@@ -339,7 +339,7 @@ int cav_contacts_narrow(const cav_state *state) {
 
 int cav_contacts_have_meshes(const cav_state *state) { return state->work->geom && state->work->geom->hint; }
 
-cav_hint **cav_contacts_hints(const cav_state *state) {
+cav_hint **cav_contacts_hints(cav_state *state) {
   return cav_contacts_have_meshes(state) ? &state->work->geom->hint : NULL;
 }
 

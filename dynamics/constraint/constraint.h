@@ -24,7 +24,7 @@ int cav_contacts_have_meshes(const cav_state *state);
 
 /// Where the state's searches of pairs with a mesh ended, [npair]; another array of these may take its place, which the state
 /// then owns. NULL: it has no such pair. collide.c.
-cav_hint **cav_contacts_hints(const cav_state *state);
+cav_hint **cav_contacts_hints(cav_state *state);
 
 /// Broad and narrow phase over model->pair at the state's poses: fills pair, feature, dim, links, pos, frame, dist,
 /// margin, friction of state->contact and ncontact. collide.c. The activation distance of a pair is its margin, or

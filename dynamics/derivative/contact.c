@@ -307,13 +307,13 @@ static void find_alignment(const cav_contact *c, geometry *g) {
 }
 
 // where the last search of a pair with a mesh ended
-static cav_hint *hint_of(const cav_model *model, const cav_state *state, int pair) {
+static cav_hint *hint_of(const cav_model *model, cav_state *state, int pair) {
   cav_hint **hints = cav_contacts_hints(state);
   return hints && cav_pair_has_mesh(model, &model->pair[pair]) ? *hints + pair : NULL;
 }
 
-static void contact_geometry(const cav_model *model, const cav_state *state, const cav_contact *c,
-                             cav_pair_manifolds *m, geometry *g) {
+static void contact_geometry(const cav_model *model, cav_state *state, const cav_contact *c, cav_pair_manifolds *m,
+                             geometry *g) {
   const cav_pair *pair = &model->pair[c->pair];
   const cav_geom *first = &model->geom[pair->geom1], *second = &model->geom[pair->geom2];
   if (m->pair != c->pair) {
@@ -621,7 +621,7 @@ static void curve_before(const cav_contact *c, const double *H, cav_contact_jaco
   turn_rows(c, kept, derivative->by_before);
 }
 
-void cav_contact_differentiate(const cav_model *model, const cav_state *state, const cav_contact *c, int whole,
+void cav_contact_differentiate(const cav_model *model, cav_state *state, const cav_contact *c, int whole,
                                cav_pair_manifolds *manifolds, cav_contact_jacobian *derivative) {
   law_derivative law;
   double H[36];

@@ -11,7 +11,7 @@
 /// Derivatives of a contact at the state's last evaluation. Where the impulse and its derivative are below 1e-13 of what
 /// a contact that pushes has, it is idle and its geometry left alone, unless whole is asked for. manifolds is kept from
 /// one contact to the next, so that those of one pair share its narrow phases. contact.c.
-void cav_contact_differentiate(const cav_model *model, const cav_state *state, const cav_contact *contact, int whole,
+void cav_contact_differentiate(const cav_model *model, cav_state *state, const cav_contact *contact, int whole,
                                cav_pair_manifolds *manifolds, cav_contact_jacobian *derivative);
 
 /// Adds what equality constraints between joints, tendons or links give du/dq, du/dv and du/dv_next [nv*nv], beyond
