@@ -110,8 +110,9 @@ static const double beyond_polish = 1.5;
 cav_status cav_run_screen(cav_solve_run *run) {
   cav_verdict v = {0};
   cav_error ignored = {0};
-  // what leads to another solve is not to be certified
-  if (!run->options->leave_refused || !run->options->gains) return CAV_OK;
+  // what leads to another solve is not to be certified; what begins at the end may be far from its optimum, its rows held
+  if (!run->options->leave_refused || !run->options->gains || run->options->first_stage > run->problem->schedule.stages)
+    return CAV_OK;
   const cav_options law = run->tr->options;
   const cav_status status = cav_verify(run->problem, run->at, &law, NULL, NULL, &v, &ignored);
   if (status == CAV_NO_MEMORY) return status;

@@ -663,6 +663,7 @@ static cav_status solve_sampled(const cav_problem *taken, int number, const cav_
   *solution = NULL;
   rest.resume = NULL;
   rest.diagnose = 0; // what is least violated stands still
+  rest.leave_refused = 0;
   for (int i = 0; i < WAYS && lost; i++) {
     cav_solution *found = NULL;
     rest.first_stage = from[i];
