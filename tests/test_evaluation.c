@@ -143,7 +143,8 @@ static void test_hints(void) {
       ".03 "
       ".12 0 -.06 .11'/></asset><worldbody><geom type='box' size='1 1 .1' pos='0 0 -.1'/>"
       "<body pos='0 0 .1'><freejoint/><geom type='mesh' mesh='m' mass='1'/></body>"
-      "<body pos='.15 0 .25'><freejoint/><geom type='mesh' mesh='m' mass='1'/></body></worldbody></mujoco>";
+      "<body pos='.15 0 .25'><freejoint/><geom type='mesh' mesh='m' mass='1'/></body>"
+      "<body pos='-.2 0 .1'><freejoint/><geom type='cylinder' size='.05 .08' mass='1'/></body></worldbody></mujoco>";
   enum { POSTURES = 8 };
   static double fresh[4000], back[4000];
   cav_model *m = scene_load(scene);

@@ -264,6 +264,52 @@ static void test_wide_face(void) {
   }
 }
 
+static int same_touches(const cav_touch *a, const cav_touch *b, int n) {
+  int same = 1;
+  for (int i = 0; i < n; i++)
+    same &= a[i].feature == b[i].feature && !memcmp(&a[i], &b[i], offsetof(cav_touch, feature));
+  return same;
+}
+
+// a cylinder or an ellipsoid near a side of a box: from whichever three of its corners the hint has, and after any move, the bits
+// are those of a search from nothing
+static void test_curved_over_box(void) {
+  int over = 0, found = 0;
+  for (int k = 0; k < POSES; k++) {
+    solid a, b;
+    random_solid(k % 2 ? CAV_GEOM_CYLINDER : CAV_GEOM_ELLIPSOID, 0, &a);
+    random_solid(CAV_GEOM_BOX, 0, &b);
+    cav_hint hint = {.na = 0};
+    for (int move = 0; move < 8; move++) {
+      cav_touch anew[CAV_TOUCH_MAX], again[CAV_TOUCH_MAX];
+      double n[3], low[3], d[3];
+      column3(n, b.shape.rotation, k % 3);
+      for (int i = 0; i < 3; i++) d[i] = -n[i];
+      cav_shape_support(&a.shape, d, low);
+      axpy3(d, b.shape.pos, b.size[k % 3] + uniform(-0.02, MARGIN), n);
+      sub3(d, d, low);
+      for (int i = 0; i < 3; i++) a.shape.pos[i] += d[i] + (move % 4 ? uniform(-0.02, 0.02) : uniform(-0.3, 0.3));
+      const int count = cav_collide_shapes(&a.shape, &b.shape, MARGIN, anew);
+      CHECK(cav_collide_again(&a.shape, &b.shape, MARGIN, &hint, again) == count);
+      CHECK(same_touches(anew, again, count));
+      found += count > 0;
+      if (hint.apart || hint.nb != 3) continue;
+      const int differ = (hint.b[0] ^ hint.b[1]) | (hint.b[0] ^ hint.b[2]), fixed = hint.b[0] & ~differ;
+      const int k1 = differ & -differ, corner[4] = {fixed, fixed | k1, fixed | (differ - k1), fixed | differ};
+      for (int left = 0; left < 4; left++) {
+        for (int i = 0, at = 0; i < 4; i++)
+          if (i != left) hint.b[at++] = corner[i];
+        CHECK(cav_collide_again(&a.shape, &b.shape, MARGIN, &hint, again) == count);
+        CHECK(same_touches(anew, again, count));
+        over += hint.nb == 3;
+      }
+    }
+    let_go(&a), let_go(&b);
+  }
+  printf("curved bodies near boxes: %d of %d meet, proven over a side %d times\n", found, 8 * POSES, over);
+  CHECK(over > POSES && found > 4 * POSES);
+}
+
 // over a side of a box a corner of a mesh is proven to be nearest from whichever three of the side's corners the hint has, by the
 // height above that side
 static void test_side_of_box(void) {
@@ -821,6 +867,7 @@ int main(void) {
   test_degenerate();
   test_wide_face();
   test_side_of_box();
+  test_curved_over_box();
   test_level(0);
   test_level(1e-11);
   test_hills();

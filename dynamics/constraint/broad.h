@@ -14,9 +14,9 @@ typedef struct candidate {
   int pair;          ///< its number
   signed char plane; ///< 1 if the first geom is a plane
   signed char four;  ///< 1 if it and the three that follow can be looked at together: of one plane or of none
-  signed char external, sought, mesh; ///< as in the pair; 1 if cav_pair_is_sought; 1 if one of the two is a mesh
-  double margin;                      ///< of the pair
-  double bound;                       ///< sum of bounding radii; of the second geom alone if the first is a plane
+  signed char external, sought, hinted; ///< as in the pair; 1 if cav_pair_is_sought; 1 if cav_pair_keeps_hint
+  double margin;                        ///< of the pair
+  double bound;                         ///< sum of bounding radii; of the second geom alone if the first is a plane
 } candidate;
 
 /// A geom in some pair.
@@ -44,9 +44,9 @@ struct cav_geom_cache {
   cav_fixed *fixed;  ///< NULL: there is little to leave out
   cav_sweep *sweep;  ///< NULL: all pairs that are left are looked at
   int sweep_from;
-  cav_hint *hint; ///< [npair] where the last searches ended; NULL: no pair has a mesh
-  double margin;  ///< largest of all pairs
-  int sought;     ///< some pair is
+  cav_hint *hint;     ///< [npair] where the last searches ended; NULL: no pair keeps one
+  double margin;      ///< largest of all pairs
+  int sought, meshes; ///< some pair is; has a mesh
 };
 
 // centre of a geom that moves

@@ -28,9 +28,9 @@ static void open_slot(const cav_model *model, const cav_geom *geom, slot *s, dou
   s->turned = 1;
 }
 
-// gives each geom in a pair a slot; whether some pair has a mesh
+// gives each geom in a pair a slot; whether some pair keeps a hint
 static int open_slots(const cav_model *model, struct cav_geom_cache *cache, int *slot_of) {
-  int meshes = 0;
+  int hinted = 0;
   for (int g = 0; g < model->ngeom; g++) { slot_of[g] = -1; }
   for (int p = 0; p < model->npair; p++) {
     const cav_pair *pair = model->pair + p;
@@ -51,12 +51,13 @@ static int open_slots(const cav_model *model, struct cav_geom_cache *cache, int 
     c->margin = pair->margin;
     c->plane = a->type == CAV_GEOM_PLANE;
     c->sought = (signed char)cav_pair_is_sought(model, pair);
-    c->mesh = (signed char)cav_pair_has_mesh(model, pair);
+    c->hinted = (signed char)cav_pair_keeps_hint(model, pair);
     cache->sought |= c->sought;
-    meshes |= c->mesh;
+    cache->meshes |= cav_pair_has_mesh(model, pair);
+    hinted |= c->hinted;
     c->bound = b->bound + (c->plane ? 0 : a->bound);
   }
-  return meshes;
+  return hinted;
 }
 
 // which candidates the broad phase may take together with three more
@@ -180,12 +181,12 @@ struct cav_geom_cache *cav_geom_cache_new(const cav_model *model, int sweep_from
     cav_geom_cache_free(cache);
     return NULL;
   }
-  const int meshes = open_slots(model, cache, slot_of);
+  const int hinted = open_slots(model, cache, slot_of);
   cache->ncandidate = model->npair;
   cache->activation[0] = cache->activation[1] = NAN;
   free(slot_of);
-  if (meshes) cache->hint = calloc((size_t)model->npair, sizeof *cache->hint);
-  if ((meshes && !cache->hint) || !open_pruning(model, cache, sweep_from)) {
+  if (hinted) cache->hint = calloc((size_t)model->npair, sizeof *cache->hint);
+  if ((hinted && !cache->hint) || !open_pruning(model, cache, sweep_from)) {
     cav_geom_cache_free(cache);
     return NULL;
   }
@@ -337,10 +338,10 @@ int cav_contacts_narrow(const cav_state *state) {
          !o->coupled;
 }
 
-int cav_contacts_have_meshes(const cav_state *state) { return state->work->geom && state->work->geom->hint; }
+int cav_contacts_have_meshes(const cav_state *state) { return state->work->geom && state->work->geom->meshes; }
 
 cav_hint **cav_contacts_hints(cav_state *state) {
-  return cav_contacts_have_meshes(state) ? &state->work->geom->hint : NULL;
+  return state->work->geom && state->work->geom->hint ? &state->work->geom->hint : NULL;
 }
 
 // the geom as a shape, its rotation formed at the first request
@@ -406,8 +407,8 @@ static inline cav_status collide_pair(const cav_model *model, cav_state *state, 
   if (chosen && far < margin && !cav_collide_shapes(a, b, far, touch)) return CAV_OK;
   // by the gap after the step all points of a near pair may bear, those that come nearer by a turn, too
   if (state->options.next_gap != CAV_NEXT_GAP_EXACT && !chosen) margin = far;
-  int count =
-      c->mesh ? cav_collide_again(a, b, margin, &cache->hint[c->pair], touch) : cav_collide_shapes(a, b, margin, touch);
+  int count = c->hinted ? cav_collide_again(a, b, margin, &cache->hint[c->pair], touch)
+                        : cav_collide_shapes(a, b, margin, touch);
   assert(count <= CAV_TOUCH_MAX);
   cav_status status = CAV_OK;
   for (int k = 0; k < count && status == CAV_OK; k++) status = push(model, state, c->pair, touch + k);
@@ -506,7 +507,7 @@ cav_status cav_contacts_find(const cav_model *model, cav_state *state) {
 int cav_contacts_listed(const cav_model *model, const cav_state *state) {
   const struct cav_geom_cache *cache = state->work->geom;
   if (!seeks_contacts(model, state)) return 1;
-  if (cache->hint || cache->fixed || cache->sweep) return 0;
+  if (cache->meshes || cache->fixed || cache->sweep) return 0;
   for (int k = 0; k < cache->nmoving; k++) {
     if (cache->slot[cache->moving[k]].geom->type == CAV_GEOM_PLANE) return 0;
   }

@@ -22,8 +22,8 @@ int cav_contacts_narrow(const cav_state *state);
 /// Whether a pair of the state's model has a mesh. collide.c.
 int cav_contacts_have_meshes(const cav_state *state);
 
-/// Where the state's searches of pairs with a mesh ended, [npair]; another array of these may take its place, which the state
-/// then owns. NULL: it has no such pair. collide.c.
+/// Where the state's searches of pairs that keep a hint ended, [npair]; another array of these may take its place, which the
+/// state then owns. NULL: it has no such pair. collide.c.
 cav_hint **cav_contacts_hints(cav_state *state);
 
 /// Broad and narrow phase over model->pair at the state's poses: fills pair, feature, dim, links, pos, frame, dist,
@@ -34,6 +34,11 @@ cav_status cav_contacts_find(const cav_model *model, cav_state *state);
 /// Whether one of the two is a mesh.
 static inline int cav_pair_has_mesh(const cav_model *model, const cav_pair *pair) {
   return model->geom[pair->geom1].type == CAV_GEOM_MESH || model->geom[pair->geom2].type == CAV_GEOM_MESH;
+}
+
+/// Whether searches of a pair are noted (cav_collide_again).
+static inline int cav_pair_keeps_hint(const cav_model *model, const cav_pair *pair) {
+  return cav_types_keep_hint(model->geom[pair->geom1].type, model->geom[pair->geom2].type);
 }
 
 /// Whether contacts of a pair are sought only where they may bear something, as their search is expensive: with a mesh, and in
@@ -208,7 +213,7 @@ typedef struct cav_next_knot {
   size_t bytes;
   int room;
   cav_next_contact *contact; ///< [room]
-  cav_hint *hint;            ///< [npair] where its searches of meshes ended; NULL: no pair has one
+  cav_hint *hint;            ///< [npair] where its searches ended; NULL: no pair keeps one
 } cav_next_knot;
 
 /// Whether rows of contacts see what is there after the step, or J v_next alone.

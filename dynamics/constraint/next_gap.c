@@ -97,7 +97,7 @@ static void seek(const cav_model *model, cav_state *state, const cav_contact *c,
   cav_next_knot *next = state->work->next;
   const cav_pair *pair = &model->pair[c->pair];
   const cav_geom *first = &model->geom[pair->geom1], *second = &model->geom[pair->geom2];
-  int mesh = next->hint && cav_pair_has_mesh(model, pair);
+  const int mesh = cav_pair_has_mesh(model, pair);
   if (mesh && s->pair == c->pair && s->margin >= margin && s->count < CAV_TOUCH_MAX) return;
   s->margin = margin;
   for (int i = 1; mesh && s->pair != c->pair && c + i < state->contact + state->ncontact && c[i].pair == c->pair; i++)
@@ -106,8 +106,8 @@ static void seek(const cav_model *model, cav_state *state, const cav_contact *c,
   cav_shape a, b;
   place(model, next->link, first, &a);
   place(model, next->link, second, &b);
-  s->count = mesh ? cav_collide_again(&a, &b, s->margin, &next->hint[c->pair], s->touch)
-                  : cav_collide_shapes(&a, &b, s->margin, s->touch);
+  s->count = cav_pair_keeps_hint(model, pair) ? cav_collide_again(&a, &b, s->margin, &next->hint[c->pair], s->touch)
+                                              : cav_collide_shapes(&a, &b, s->margin, s->touch);
 }
 
 static void look(const cav_model *model, cav_state *state, const cav_contact *c, sought *s, cav_next_contact *out) {
@@ -191,7 +191,7 @@ static void fill_gradient(const cav_model *model, const cav_state *state, const 
   if (cav_pair_has_mesh(model, pair) && is_idle(state, c)) return;
   if (m->pair != c->pair || m->margin < out->margin) {
     cav_manifolds_start(m, c->pair, fmin(1, fmin(first->bound, second->bound)), out->margin,
-                        cav_pair_has_mesh(model, pair) ? &state->work->next->hint[c->pair] : NULL);
+                        cav_pair_keeps_hint(model, pair) ? &state->work->next->hint[c->pair] : NULL);
     place(model, state->work->next->link, first, &m->a);
     place(model, state->work->next->link, second, &m->b);
   }

@@ -19,13 +19,13 @@ static cav_next_knot *knot_new(const cav_model *model, const cav_state *state) {
   next->axis = next->inertia + 6 * n;
   next->by_q = next->axis + 6 * nv;
   next->by_v = next->by_q + 6 * nv;
-  int meshes = 0;
-  for (int p = 0; p < model->npair; p++) meshes |= cav_pair_has_mesh(model, &model->pair[p]);
-  if (meshes) {
+  int hinted = 0;
+  for (int p = 0; p < model->npair; p++) hinted |= cav_pair_keeps_hint(model, &model->pair[p]);
+  if (hinted) {
     next->hint = calloc((size_t)model->npair, sizeof *next->hint);
     next->bytes += (size_t)model->npair * sizeof *next->hint;
   }
-  if (meshes && !next->hint) {
+  if (hinted && !next->hint) {
     free(next);
     return NULL;
   }

@@ -306,10 +306,10 @@ static void find_alignment(const cav_contact *c, geometry *g) {
   memset(g->tangent, 0, sizeof g->tangent);
 }
 
-// where the last search of a pair with a mesh ended
+// where the last search of a pair ended
 static cav_hint *hint_of(const cav_model *model, cav_state *state, int pair) {
   cav_hint **hints = cav_contacts_hints(state);
-  return hints && cav_pair_has_mesh(model, &model->pair[pair]) ? *hints + pair : NULL;
+  return hints && cav_pair_keeps_hint(model, &model->pair[pair]) ? *hints + pair : NULL;
 }
 
 static void contact_geometry(const cav_model *model, cav_state *state, const cav_contact *c, cav_pair_manifolds *m,

@@ -546,8 +546,7 @@ int cav_separation_solve(const cav_shape *a, const cav_shape *b, double margin, 
   double most = margin + ca.radius + cb.radius;
   if (!cav_shape_is_curved(g.a) && !hint) return cav_separation_find(&ca, &cb, g.size, most, out);
   // of many corners those near a rough direction are too many to try: first the exact one, then the few about it
-  int many = cav_shape_corners(g.b) > NEAR_MAX, proven = 0,
-      again = hint && (!cav_shape_is_curved(g.a) || (many && !swap));
+  int many = cav_shape_corners(g.b) > NEAR_MAX, proven = 0, again = hint && !swap;
   if (again) {
     int found = cav_separation_again(&ca, &cb, g.size, most, hint, out);
     if (!found || hint->na || !cav_shape_is_curved(g.a)) return found;

@@ -52,16 +52,22 @@ int cav_collide_shapes(const cav_shape *a, const cav_shape *b, double margin, ca
 /// ellipsoid, a cylinder or a box against one of the last three; 0 for others, whose search takes no longer. pairs.c.
 int cav_shapes_apart(const cav_shape *a, const cav_shape *b, double margin);
 
-/// Where the last search of a pair of polyhedra ended: the corners of both that met, up to three of each, none: 0; or a
-/// direction along which they were further apart than was asked for, in the axes of a. It saves the next search and
-/// changes no answer.
+/// Where the last search of a pair ended, of polyhedra or of a curved body and one of these: the corners of both that met, up
+/// to three of each, none: 0; or a direction along which they were further apart than was asked for, in the axes of a. It
+/// saves the next search and changes no answer.
 typedef struct cav_hint {
   int na, nb, a[3], b[3];
   int apart;
   double direction[3];
 } cav_hint;
 
-/// The same from where the last search of these two ended; of a pair without a mesh nothing is noted.
+/// Whether searches of two types, in order, are noted: of a mesh, and of an ellipsoid or a cylinder against a box.
+static inline int cav_types_keep_hint(cav_geom_type a, cav_geom_type b) {
+  return (b == CAV_GEOM_MESH && a != CAV_GEOM_PLANE) ||
+         (b == CAV_GEOM_BOX && (a == CAV_GEOM_ELLIPSOID || a == CAV_GEOM_CYLINDER));
+}
+
+/// The same from where the last search of these two ended; of types that keep none nothing is noted.
 int cav_collide_again(const cav_shape *a, const cav_shape *b, double margin, cav_hint *hint, cav_touch *touch);
 
 /// A contact point over a face of one of two bodies: a corner of the other body, or a point of one of its sides over a

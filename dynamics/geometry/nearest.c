@@ -122,21 +122,56 @@ static int curved_corner(const cav_shape *a, const double q[3], double x[3], dou
   return 1;
 }
 
+// whether a cylinder lies flush on a plane square to n, or stands on it
+static int is_flush(const cav_shape *a, const double n[3]) {
+  double local[3];
+  rotate_back(local, a->rotation, n);
+  return a->type == CAV_GEOM_CYLINDER && (fabs(local[2]) < FLUSH || fabs(local[2]) > 1 - FLUSH);
+}
+
 // a curved body, not flat on it, and a triangle q
 static int curved_triangle(const cav_shape *a, double q[3][3], double x[3], double y[3], double n[3]) {
-  double e[2][3], d[3], local[3], on[3];
+  double e[2][3], d[3], on[3];
   for (int k = 0; k < 2; k++) sub3(e[k], q[k + 1], q[0]);
   cross3(n, e[0], e[1]);
   sub3(d, q[0], a->pos);
   if (dot3(n, d) < 0) scale3(n, -1, n);
-  if (!(normalise3(n) > 0)) return 0;
-  rotate_back(local, a->rotation, n);
-  if (a->type == CAV_GEOM_CYLINDER && (fabs(local[2]) < FLUSH || fabs(local[2]) > 1 - FLUSH)) return 0;
+  if (!(normalise3(n) > 0) || is_flush(a, n)) return 0;
   cav_shape_support(a, n, x);
   // the triangle as seen from x: its normal is n or -n
   if (!from_triangle(x, q, 1, y, on)) return 0;
   sub3(d, y, x);
   return dot3(d, n) > 0;
+}
+
+// the axis of a box that its side with three corners is square to, and three corners of that side, always the same; -1: they are
+// of no side
+static int side_of(const int corner[3], int best[3]) {
+  // corners of a side differ along two axes
+  const int differ = (corner[0] ^ corner[1]) | (corner[0] ^ corner[2]);
+  const int axis = !(differ & 1) ? 0 : !(differ & 2) ? 1 : 2, side = corner[0] & 1 << axis;
+  if (differ == 7) return -1;
+  best[0] = side;
+  best[1] = side | 1 << (axis + 1) % 3;
+  best[2] = side | 1 << (axis + 2) % 3;
+  return axis;
+}
+
+// a curved body, not flat on it, over the side of a box that is square to an axis and has a corner
+static int curved_side(const cav_shape *a, const cav_shape *box, int axis, int corner, double x[3], double y[3],
+                       double n[3]) {
+  double d[3], local[3];
+  const double side = corner & 1 << axis ? 1 : -1;
+  column3(n, box->rotation, axis);
+  scale3(n, -side, n);
+  if (is_flush(a, n)) return 0;
+  cav_shape_support(a, n, x);
+  sub3(d, x, box->pos);
+  rotate_back(local, box->rotation, d);
+  for (int k = 0; k < 3; k++)
+    if (k != axis && !(fabs(local[k]) < (1 - INSIDE) * box->size[k])) return 0;
+  axpy3(y, x, side * local[axis] - box->size[axis], n);
+  return 1;
 }
 
 // the side of a cylinder and an edge q
@@ -258,18 +293,6 @@ static void span_of(const cav_mesh *m, const int *level, int n, int best[3]) {
   }
 }
 
-// three corners of the side of a box that three are of, always the same; 0: it is not highest along a direction in the box's axes
-static int side_of(const cav_shape *s, const double local[3], const int corner[3], double margin, int best[3]) {
-  // corners of a side differ along two axes
-  const int differ = (corner[0] ^ corner[1]) | (corner[0] ^ corner[2]);
-  const int axis = !(differ & 1) ? 0 : !(differ & 2) ? 1 : 2, side = corner[0] & 1 << axis;
-  if (differ == 7 || !(2 * s->size[axis] * (side ? local[axis] : -local[axis]) >= margin)) return 0;
-  best[0] = side;
-  best[1] = side | 1 << (axis + 1) % 3;
-  best[2] = side | 1 << (axis + 2) % 3;
-  return 1;
-}
-
 // a corner p of one body and three corners of a mesh or a box, the highest along a direction, but for more in their plane: on
 // that plane
 static int on_level(const double p[3], const cav_shape *s, const double towards[3], const int corner[3], double margin,
@@ -278,7 +301,8 @@ static int on_level(const double p[3], const cav_shape *s, const double towards[
   int level[LEVEL_MAX], best[3];
   rotate_back(local, s->rotation, towards);
   if (s->type == CAV_GEOM_BOX) {
-    if (!side_of(s, local, corner, margin, best)) return 0;
+    const int axis = side_of(corner, best);
+    if (axis < 0 || !(2 * s->size[axis] * (best[0] ? local[axis] : -local[axis]) >= margin)) return 0;
   } else {
     int count = s->type == CAV_GEOM_MESH ? level_with(s->mesh, local, corner, margin, level) : 0;
     if (!count) return 0;
@@ -291,19 +315,24 @@ static int on_level(const double p[3], const cav_shape *s, const double towards[
 int cav_nearest_prove(const cav_core *a, const cav_core *b, double size, const cav_hint *hint, cav_separation *out) {
   double p[3][3], q[3][3], n[3], x[3], y[3], d[3], back[3];
   const int na = hint->na, nb = hint->nb, curved = cav_shape_is_curved(a->shape);
-  int straight = 0;
+  int straight = 0, side[3], axis = -1;
   if (na < 1 || nb < 1 || (na > 1 && nb > 1 && na + nb > 4)) return 0;
   for (int i = 0; i < na && !curved; i++) cav_shape_corner(a->shape, hint->a[i], p[i]);
-  for (int i = 0; i < nb; i++) cav_shape_corner(b->shape, hint->b[i], q[i]);
+  if (curved && nb == 3 && b->shape->type == CAV_GEOM_BOX && (axis = side_of(hint->b, side)) < 0) return 0;
+  for (int i = 0; i < nb; i++) cav_shape_corner(b->shape, axis < 0 ? hint->b[i] : side[i], q[i]);
   if (!curved) copy3(x, p[0]);
   copy3(y, q[0]);
-  if (curved ? !from_curved(a->shape, q, nb, size, x, y, n, &straight) : !from_corners(p, na, q, nb, x, y, n)) return 0;
+  if (!(axis >= 0 ? curved_side(a->shape, b->shape, axis, side[0], x, y, n)
+        : curved  ? from_curved(a->shape, q, nb, size, x, y, n, &straight)
+                  : from_corners(p, na, q, nb, x, y, n)))
+    return 0;
   if (!(normalise3(n) > 0)) return 0;
   sub3(d, y, x);
   double gap = dot3(d, n);
   scale3(back, -1, n);
   if (!(gap > APART * size)) return 0;
-  int top_a = curved || is_top(a, n, hint->a, na, LOWER * size), top_b = is_top(b, back, hint->b, nb, LOWER * size);
+  int top_a = curved || is_top(a, n, hint->a, na, LOWER * size);
+  int top_b = axis >= 0 || is_top(b, back, hint->b, nb, LOWER * size);
   if (!top_b && (!top_a || curved || nb < 3 || !on_level(x, b->shape, back, hint->b, LOWER * size, y, n))) return 0;
   if (!top_a) {
     if (na < 3 || !on_level(y, a->shape, n, hint->a, LOWER * size, x, n)) return 0;

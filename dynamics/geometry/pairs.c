@@ -293,7 +293,7 @@ static void sort(cav_touch *touch, int count) {
   }
 }
 
-// the last two columns of every row: meshes are taken up below
+// the last two columns of every row: pairs that keep a hint are taken up below
 #define MESH NULL, cav_collide_hfield
 
 typedef int routine(const cav_shape *a, const cav_shape *b, double margin, cav_touch *touch);
@@ -309,14 +309,14 @@ int cav_collide_again(const cav_shape *a, const cav_shape *b, double margin, cav
       {NULL, plane_sphere, plane_capsule, plane_ellipsoid, plane_cylinder, plane_box, cav_collide_plane_mesh, NULL},
       {NULL, sphere_sphere, sphere_capsule, sphere_ellipsoid, sphere_cylinder, sphere_box, MESH},
       {NULL, NULL, capsule_capsule, cav_collide_segment, cav_collide_segment, cav_collide_segment, MESH},
-      {NULL, NULL, NULL, cav_collide_convex, cav_collide_convex, cav_collide_convex, MESH},
-      {NULL, NULL, NULL, NULL, cav_collide_convex, cav_collide_convex, MESH},
+      {NULL, NULL, NULL, cav_collide_convex, cav_collide_convex, NULL, MESH},
+      {NULL, NULL, NULL, NULL, cav_collide_convex, NULL, MESH},
       {NULL, NULL, NULL, NULL, NULL, cav_collide_boxes, MESH},
       {NULL, NULL, NULL, NULL, NULL, NULL, MESH},
       {NULL}};
   routine *collide = table[a->type][b->type];
-  int meshes = b->type == CAV_GEOM_MESH && a->type != CAV_GEOM_PLANE;
-  int count = meshes ? cav_collide_mesh(a, b, margin, hint, touch) : collide ? collide(a, b, margin, touch) : 0;
+  const int hinted = cav_types_keep_hint(a->type, b->type);
+  int count = hinted ? cav_collide_hinted(a, b, margin, hint, touch) : collide ? collide(a, b, margin, touch) : 0;
   sort(touch, count);
   return count;
 }

@@ -31,8 +31,8 @@ int cav_collide_plane_mesh(const cav_shape *a, const cav_shape *b, double margin
 /// Convex pairs without a routine of their own: ellipsoid, cylinder, box (not two) and mesh; sphere or capsule against
 /// mesh; a capsule whose segment cuts an ellipsoid, cylinder or box: up to 8 points. polytope.c.
 int cav_collide_convex(const cav_shape *a, const cav_shape *b, double margin, cav_touch *touch);
-/// The same where b is a mesh: first by the boxes about both, then from where the last search of the pair ended.
-int cav_collide_mesh(const cav_shape *a, const cav_shape *b, double margin, cav_hint *hint, cav_touch *touch);
+/// The same of two whose searches are noted: first by the boxes about both, then from where their last one ended.
+int cav_collide_hinted(const cav_shape *a, const cav_shape *b, double margin, cav_hint *hint, cav_touch *touch);
 
 /// Keeps the deepest of n contacts and those furthest from the ones kept, most at most; returns how many. polytope.c.
 int cav_thin_out(cav_touch *touch, int n, int most);

@@ -568,7 +568,7 @@ static int boxes_apart(const cav_shape *a, const cav_shape *b, double margin) {
   return 0;
 }
 
-int cav_collide_mesh(const cav_shape *a, const cav_shape *b, double margin, cav_hint *hint, cav_touch *touch) {
+int cav_collide_hinted(const cav_shape *a, const cav_shape *b, double margin, cav_hint *hint, cav_touch *touch) {
   return boxes_apart(a, b, margin) ? 0 : collide_again(a, b, margin, hint, touch);
 }
 
