@@ -34,7 +34,7 @@ static void run(const char *folder) {
   if (tr) {
     tr->options = problem->contact;
     const double begin = seconds();
-    CHECK(cav_choose_gains(problem, tr, result->trajectory, 0, note_set, &sets, &solution, &error) == CAV_OK);
+    CHECK(cav_choose_gains(problem, tr, result->trajectory, 0, note_set, &sets, &solution, NULL, &error) == CAV_OK);
     const double chosen = seconds();
     CHECK(cav_verify_solution(problem, &solution, &v, &error) == CAV_OK);
     const double end = seconds();

@@ -67,7 +67,7 @@ static void choose(cav_result *result) {
   cav_solution solution = {.contact = result->problem->contact};
   if (!CHECK(tr != NULL)) return;
   tr->options = result->problem->contact;
-  CHECK(cav_choose_gains(result->problem, tr, result->trajectory, 0, go_on, NULL, &solution, &error) == CAV_OK);
+  CHECK(cav_choose_gains(result->problem, tr, result->trajectory, 0, go_on, NULL, &solution, NULL, &error) == CAV_OK);
   free(result->gain_q), free(result->gain_v);
   result->gain_q = solution.gain_q, result->gain_v = solution.gain_v;
   solution.gain_q = solution.gain_v = NULL;

@@ -101,8 +101,12 @@ int main(void) {
     }
     cav_solution solution = {.contact = tr->options};
     cav_error error = {0};
+    int follows, first;
+    double seconds, off;
     run = 0;
-    CHECK(cav_choose_gains(&problem, tr, motion, 0, next, NULL, &solution, &error) == CAV_OK);
+    CHECK(cav_choose_gains(&problem, tr, motion, 0, next, NULL, &solution, &follows, &error) == CAV_OK);
+    outcome(best, &first, &seconds, &off);
+    CHECK(follows == (first >= CAV_LOOP_START));
     CHECK(trial == trials - 1);
     if (CHECK(solution.gain_q)) CHECK((int)*solution.gain_q == best);
     // a loop out of its order is one more at most
@@ -117,7 +121,7 @@ int main(void) {
   for (int k = 0; k < CAV_LOOP_START; k++) drawn[0][k].error = 0.04;
   cav_solution solution = {.contact = tr->options};
   run = 0;
-  CHECK(cav_choose_gains(&problem, tr, motion, 0, next, NULL, &solution, NULL) == CAV_OK);
+  CHECK(cav_choose_gains(&problem, tr, motion, 0, next, NULL, &solution, NULL, NULL) == CAV_OK);
   CHECK(trial == FEW && run == CAV_LOOPS + FEW);
   cav_gains_free(&solution);
   // what ends 0.12 m away is near enough once three others were no nearer
@@ -125,7 +129,7 @@ int main(void) {
     for (int k = 0; k < CAV_LOOPS; k++) drawn[i][k] = (struct cav_follow){.seconds = 1, .error = 0.12};
   solution = (cav_solution){.contact = tr->options};
   run = 0;
-  CHECK(cav_choose_gains(&problem, tr, motion, 0, next, NULL, &solution, NULL) == CAV_OK);
+  CHECK(cav_choose_gains(&problem, tr, motion, 0, next, NULL, &solution, NULL, NULL) == CAV_OK);
   CHECK(trial == FEW && run == CAV_LOOPS + FEW && (int)*solution.gain_q == 0);
   cav_gains_free(&solution);
   cav_trajectory_free(motion);

@@ -2,8 +2,9 @@
 /// block, against its closed form, and problems stated in a minute each, tests/pushing, whose stated guess ends at a
 /// motion that stands still, certified by the strategy that brings it there first: seven of a body that has to be pushed, two
 /// of a touch sensor that is to feel a force, which it has no derivative for until something touches. Where both hands of a
-/// humanoid come to a crate and a carton (solver/carry.c), and the carton lifted.
+/// humanoid come to a crate, a carton and a door (solver/carry.c), and the carton lifted.
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "carry.h"
@@ -164,6 +165,39 @@ static void test_both(void) {
   }
 }
 
+/// A door of 0.9 m on a hinge that is 0.5 m to the left: it goes to where its joint is asked for, and both hands to its face, as
+/// high as they hang, its own thickness and theirs from its middle; one hand alone has no term that keeps it from tumbling.
+static void test_door(void) {
+  cav_problem *p = load("../unseen/door-hinged");
+  if (!p) return;
+  const int door = cav_object_find(p->model, CAV_OBJECT_JOINT, "door"), at = p->model->joint[door].q;
+  cav_carry c;
+  CHECK(cav_carry_find(p, 1, &c) == CAV_OK && c.found == 4 && !c.lifts && c.thing == door);
+  CHECK_NEAR(c.angle, 0.785, 1e-12);
+  for (int k = 0; k < 2; k++) {
+    const double thick = -c.place[k][0] - 0.02;
+    CHECK(thick > 0 && thick <= p->model->geom[c.term[k].sensor.object].bound);
+    CHECK_NEAR(c.place[k][1], -0.45 + (k ? 1 : -1) * fabs(c.place[1][1] - c.place[0][1]) / 2, 0.05);
+  }
+  const double turned[2] = {0.45 * sin(0.785), 0.45 * (1 - cos(0.785))};
+  for (int k = 0; k < 2; k++) CHECK_NEAR(c.there[k] - c.still[k], turned[k], 1e-12);
+  CHECK_NEAR(c.still[0], 0.55, 1e-12);
+  CHECK_NEAR(c.still[1], 0.05, 1e-12);
+  double *q = malloc(2 * (size_t)p->model->nq * sizeof *q);
+  cav_guess_pose pose[2];
+  if (q) {
+    cav_carry_poses(p, &c, q, pose);
+    CHECK(pose[0].q[at] == p->q_start[at] && pose[1].q[at] == c.angle);
+  }
+  free(q);
+  cav_hand hand;
+  CHECK(cav_hand_find(p, 1, &hand) == CAV_OK && hand.hung && hand.found == 2);
+  // the hand that the touch sensor is to feel
+  CHECK_TEXT(p->model->geom[hand.term[0].sensor.object].name, "hand_right");
+  CHECK(hand.term[1].sensor.object_type == CAV_OBJECT_BODY && hand.term[1].to == hand.term[0].from);
+  cav_problem_free(p);
+}
+
 /// A file that says nothing of hands is begun with both; one whose terms bring them there as it states.
 static void test_begun(void) {
   for (int told = 0; told < 2; told++) {
@@ -204,6 +238,7 @@ int main(void) {
   test_components();
   test_touched();
   test_both();
+  test_door();
   test_begun();
   test_none();
   static const struct {

@@ -1,7 +1,9 @@
 /// Where the last phase is stuck it goes on by way of softer laws: a box that is shoved stands still a tenth above where it
 /// ends so, by slow steps where softer laws gain nothing. Where no end is asked for it is not tried, and a motion that is
 /// not stuck has none.
+#include "lqr.h"
 #include "motion.h"
+#include "transcription.h"
 
 /// Cost at the end of the first run of the last phase, stages of softer laws.
 typedef struct course {
@@ -109,7 +111,46 @@ static void check_end(void) {
   CHECK(some > 0 && 2 * some < all && near >= last && near < (1 + 5e-5) * last);
 }
 
+/// Choices of gains, of all sets and of the few of a motion that is stuck; whether it is told that these follow.
+static int of_all, of_few, told;
+
+cav_status __real_cav_choose_gains(const cav_problem *problem, const cav_transcription *tr, const cav_trajectory *at,
+                                   int sets, int (*report)(void *context, int set, int most), void *context,
+                                   cav_solution *solution, int *follows, cav_error *error);
+cav_status __wrap_cav_choose_gains(const cav_problem *problem, const cav_transcription *tr, const cav_trajectory *at,
+                                   int sets, int (*report)(void *context, int set, int most), void *context,
+                                   cav_solution *solution, int *follows, cav_error *error);
+cav_status __wrap_cav_choose_gains(const cav_problem *problem, const cav_transcription *tr, const cav_trajectory *at,
+                                   int sets, int (*report)(void *context, int set, int most), void *context,
+                                   cav_solution *solution, int *follows, cav_error *error) {
+  cav_status status = __real_cav_choose_gains(problem, tr, at, sets, report, context, solution, follows, error);
+  *(follows ? &of_few : &of_all) += 1;
+  if (follows) *follows = told;
+  return status;
+}
+
+/// One that is stuck and that no gains follow is left there, with the gains that say where it is lost; one that some follow goes
+/// on, and has those that are found at its end. Without other strategies it goes on whatever they do.
+static void test_left(int leaves, int follows) {
+  cav_problem *problem = shove();
+  cav_solution *s = NULL;
+  cav_solve_options options = cav_solve_options_default();
+  if (!problem) return;
+  problem->schedule.optimality = 0;
+  options.optimality = 5e-4, options.leave_refused = leaves;
+  of_all = of_few = 0, told = follows;
+  CHECK(cav_solve(problem, &options, NULL, &s, NULL) == CAV_OK);
+  int softened = 0;
+  for (int i = 0; s && i < s->nstage; i++) softened += !strcmp(s->stage[i].phase, "softened");
+  if (CHECK(s)) CHECK(s->gain_q && s->unactuated <= CAV_TOLERANCE_UNACTUATED);
+  CHECK(of_few == leaves && of_all == (!leaves || follows));
+  CHECK(!softened == (leaves && !follows));
+  cav_solution_free(s);
+  cav_problem_free(problem);
+}
+
 int main(void) {
+  test_left(0, 0), test_left(1, 0), test_left(1, 1);
   test_stopped(shove(), (patience){"softened", 40, 5e-4}, 0.043);
   test_stopped(shove(), (patience){"sqp", 150, 1e-4}, 0.043);
   check_end();

@@ -170,7 +170,7 @@ static int done(const search *s, int trials) {
 
 cav_status cav_choose_gains(const cav_problem *problem, const cav_transcription *tr, const cav_trajectory *at, int sets,
                             int (*report)(void *context, int set, int most), void *context, cav_solution *solution,
-                            cav_error *error) {
+                            int *follows, cav_error *error) {
   search s = {.problem = problem, .tr = tr, .at = at, .solution = solution};
   s.n = ((size_t)tr->nknot - 1) * (size_t)tr->nv * (size_t)tr->nv;
   s.gain = malloc(2 * s.n * sizeof *s.gain);
@@ -186,6 +186,7 @@ cav_status cav_choose_gains(const cav_problem *problem, const cav_transcription 
     status = report(context, i + 1, trials) ? CAV_INTERRUPTED : try(&s, &one);
     if (done(&s, i + 1)) break;
   }
+  if (follows) *follows = s.found && s.reached.follows >= CAV_LOOP_START;
   if (s.found && s.reached.follows >= CAV_LOOP_PUSHED && !problem->cycle.on) {
     solution->followed = cav_followed_new(&s.verification, solution->gain_q, solution->gain_v, s.best_follow);
     if (!solution->followed && status == CAV_OK) status = CAV_NO_MEMORY;

@@ -21,10 +21,11 @@ cav_status cav_feedback(const cav_transcription *transcription, const cav_trajec
 
 /// Feedback gains of a motion into its solution: the best of a number of sets, 0: of all, by the closed loops of
 /// verification. report is called before each set, from 1 to most, and ends the search by a nonzero return:
-/// CAV_INTERRUPTED with the best so far, NULL if there is none. choose_gains.c.
+/// CAV_INTERRUPTED with the best so far, NULL if there is none. follows, NULL: not asked for: whether the motion is followed
+/// from its own start with them. choose_gains.c.
 cav_status cav_choose_gains(const cav_problem *problem, const cav_transcription *transcription,
                             const cav_trajectory *at, int sets, int (*report)(void *context, int set, int most),
-                            void *context, cav_solution *solution, cav_error *error);
+                            void *context, cav_solution *solution, int *follows, cav_error *error);
 
 /// Frees a solution's gains and what is known of their closed loops: it has none then.
 void cav_gains_free(cav_solution *solution);

@@ -1,7 +1,7 @@
-/// Both hands to a free body that is asked for elsewhere. Where what has hands stands on a free base, one hand alone turns or
-/// tips what is heavy, and a guess in which the base stays where it is pushes as far as arms reach. So both are led: to the
-/// side that it is pushed from, as low as it does not tip, or where it is to be lifted to its two sides; the base goes along.
-/// Terms of a cost lead, and are no part of the problem.
+/// Both hands to a free body that is asked for elsewhere, or to a door or a drawer. Where what has hands stands on a free base,
+/// one hand alone turns or tips what is heavy, and a guess in which the base stays where it is pushes as far as arms reach. So
+/// both are led: to the side that it is pushed from, as low as it does not tip, or where it is to be lifted to its two sides;
+/// the base goes along. Terms of a cost lead, and are no part of the problem.
 #include "carry.h"
 
 #include <math.h>
@@ -72,7 +72,7 @@ static double ground_friction(const cav_model *m, int link) {
 
 static int is_still(const cav_problem *p, int joint) {
   const double *v = p->v_start + p->model->joint[joint].dof;
-  for (int k = 0; k < 6; k++)
+  for (int k = 0; k < (p->model->joint[joint].type == CAV_JOINT_FREE ? 6 : 1); k++)
     if (v[k] != 0) return 0;
   return 1;
 }
@@ -172,7 +172,8 @@ static void find_back(const hands *h, double away, double place[2][3]) {
     axpy3(place[k], centre, depth + away * cav_geom_reach(geom, &hand, n), n);
     axpy3(place[k], place[k], k ? -apart : apart, across);
     const double thick = cav_geom_reach(geom, &hand, up), tips = lowest + steady * edge / h->friction;
-    place[k][2] = fmax(fmin(fmin(h->at[k][2], tips), top - thick), lowest + thick);
+    const double high = h->thing.joint < 0 ? fmin(h->at[k][2], tips) : h->at[k][2];
+    place[k][2] = fmax(fmin(high, top - thick), lowest + thick);
   }
 }
 
@@ -183,28 +184,38 @@ static void find_times(const cav_problem *p, const hands *h, double come, cav_ca
   c->to = !held && is_asked_at_end(p, CAV_DOFS_JOINTS) ? fmax(leaves * end, c->from + p->timestep) : end;
 }
 
+/// Adds a term on what they move.
+static cav_term *push_term(cav_carry *c, cav_sensor_type type, cav_object_type kind, int body, const double *target) {
+  cav_term *term = &c->term[c->found++];
+  *term = cav_leading_term(type, kind, body, target);
+  return term;
+}
+
 static void lay(const hands *h, const cav_pose *body, double place[2][3], cav_carry *c) {
   const cav_model *m = h->m;
-  const int index = m->link[h->thing.link].body;
+  const int index = m->link[h->thing.link].body, hung = h->thing.joint >= 0;
+  const cav_object_type kind = hung ? CAV_OBJECT_BODY : CAV_OBJECT_XBODY;
+  cav_pose pose;
+  c->found = 0;
   for (int k = 0; k < 2; k++) {
     double d[3];
     sub3(d, place[k], body->pos);
     rotate_back(c->place[k], body->rotation, d);
-    c->term[k] = cav_leading_term(CAV_SENSOR_FRAMEPOS, CAV_OBJECT_GEOM, h->geom[k], c->place[k]);
-    c->term[k].sensor.referred = 1, c->term[k].sensor.reference_type = CAV_OBJECT_XBODY;
-    c->term[k].sensor.reference = index;
-    c->term[k].from = c->from, c->term[k].to = c->to;
+    cav_term *term = push_term(c, CAV_SENSOR_FRAMEPOS, CAV_OBJECT_GEOM, h->geom[k], c->place[k]);
+    term->sensor.referred = 1, term->sensor.reference_type = CAV_OBJECT_XBODY;
+    term->sensor.reference = index;
+    term->from = c->from, term->to = c->to;
   }
+  cav_object_pose(m, h->state, kind, index, &pose);
   column3(c->upright, body->rotation, 2);
-  copy3(c->still, body->pos);
-  add3(c->there, body->pos, h->thing.way);
-  c->term[2] = cav_leading_term(CAV_SENSOR_FRAMEZAXIS, CAV_OBJECT_XBODY, index, c->upright);
-  c->term[2].to = h->thing.time;
-  c->term[3] = cav_leading_term(CAV_SENSOR_FRAMEPOS, CAV_OBJECT_XBODY, index, c->still);
-  c->term[3].to = c->from;
-  c->term[4] = cav_leading_term(CAV_SENSOR_FRAMEPOS, CAV_OBJECT_XBODY, index, c->there);
-  c->term[4].from = c->to, c->term[4].to = h->thing.time;
-  c->found = c->to < h->thing.time ? CAV_CARRY_TERMS : CAV_CARRY_TERMS - 1;
+  copy3(c->still, pose.pos);
+  add3(c->there, pose.pos, h->thing.way);
+  if (!hung) push_term(c, CAV_SENSOR_FRAMEZAXIS, kind, index, c->upright)->to = h->thing.time;
+  push_term(c, CAV_SENSOR_FRAMEPOS, kind, index, c->still)->to = c->from;
+  if (c->to < h->thing.time) {
+    cav_term *there = push_term(c, CAV_SENSOR_FRAMEPOS, kind, index, c->there);
+    there->from = c->to, there->to = h->thing.time;
+  }
   for (int k = 0; k < 2; k++)
     if (!isfinite(norm3(c->place[k]))) c->found = 0;
 }
@@ -257,7 +268,8 @@ cav_status cav_carry_find(const cav_problem *problem, double away, cav_carry *ca
   if (!status && h.thing.link && roles.body[CAV_ROLE_RIGHT_HAND] > 0 && roles.body[CAV_ROLE_LEFT_HAND] > 0) {
     h.state = state;
     carry->lifts = h.thing.rise >= CAV_THING_WAY;
-    carry->thing = free_joint(m, h.thing.link);
+    carry->thing = h.thing.joint >= 0 ? h.thing.joint : free_joint(m, h.thing.link);
+    carry->hung = h.thing.joint >= 0, carry->angle = h.thing.angle;
     carry->root = free_joint(m, m->body[roles.body[CAV_ROLE_RIGHT_HAND]].link);
     const int alone = m->link[h.thing.link].root == h.thing.link;
     const int usable = carry->thing >= 0 && carry->root >= 0 && alone && is_still(problem, carry->thing);
@@ -274,7 +286,8 @@ void cav_carry_poses(const cav_problem *problem, const cav_carry *carry, double 
     double *at = q + (size_t)i * (size_t)m->nq;
     memcpy(at, problem->q_start, (size_t)m->nq * sizeof *at);
     for (int k = 0; k < 2; k++) at[root + k] += carry->come[k] + (i ? carry->go[k] : 0);
-    if (i) copy3(at + thing, carry->there);
+    if (i && carry->hung) at[thing] = carry->angle;
+    if (i && !carry->hung) copy3(at + thing, carry->there);
     pose[i] = (cav_guess_pose){i ? carry->to : carry->from, at};
   }
 }

@@ -6,8 +6,8 @@
 
 enum { CAV_CARRY_TERMS = 5 };
 
-/// Terms that bring the hands to two places of a free body, keep it from tumbling, where it is until then and where it is asked
-/// for once they leave it; and how the body that has the hands comes and goes along.
+/// Terms that bring the hands to two places of a body that is free or hangs on one joint, keep a free one from tumbling, where it
+/// is until then and where it is asked for once they leave it; and how the body that has the hands comes and goes along.
 typedef struct cav_carry {
   int found; ///< number of terms; 0: nothing that no actuator moves is asked for elsewhere, it moves at the start, or there
              ///< are no two hands on a free base that can touch it
@@ -16,7 +16,9 @@ typedef struct cav_carry {
   double place[2][3];             ///< m, of the right and the left hand in the frame of the body
   double upright[3];              ///< z axis of the body at the start
   double still[3], there[3];      ///< m, where it is at the start and where it is asked for last
-  int root, thing;                ///< free joints of what has the hands and of what they move
+  int root, thing;                ///< free joint of what has the hands, and the joint of what they move
+  int hung;                       ///< 1: that joint is a hinge or a slide
+  double angle;                   ///< rad or m, of a joint that is not free, where it is asked for last
   double come[2], go[2]; ///< m, along the ground, how the root goes to where the hands reach it, and on from there
   double from, to;       ///< s, when the hands are there
 } cav_carry;

@@ -88,6 +88,10 @@ int cav_run_certifiable(const cav_solve_run *run);
 /// and its rows nearly hold. CAV_NO_MEMORY. solution.c.
 cav_status cav_run_screen(cav_solve_run *run);
 
+/// Whether no set of gains, of a few, follows the motion that stands: into run->refused, where the options leave such ones, and
+/// the best of them into the solution. CAV_NO_MEMORY, CAV_INTERRUPTED. solution.c.
+cav_status cav_run_screen_feedback(cav_solve_run *run);
+
 /// Whether efforts and ranges are within what is planned with, as a certificate asks.
 int cav_run_within_limits(const cav_solve_run *run);
 

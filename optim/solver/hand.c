@@ -1,6 +1,6 @@
-/// A hand to what has to be pushed. Where a body that no actuator moves is asked for elsewhere, the helper forces of the first
-/// stages carry it there: they roll it along, since sliding costs more of them, and nothing brings a hand to it when they
-/// fade. So one is brought there first: the geom of a driven tree that serves best and of these is nearest to the
+/// A hand to what has to be pushed, a door among them. Where a body that no actuator moves is asked for elsewhere, the helper
+/// forces of the first stages carry it there: they roll it along, since sliding costs more of them, and nothing brings a hand to
+/// it when they fade. So one is brought there first: the geom of a driven tree that serves best and of these is nearest to the
 /// body, to the side opposite to the way, at the height of the body's centre or as low as it can be over the ground.
 /// A touch sensor reads nothing until something touches, and has no derivative there: where a force is asked of one, what
 /// serves best is brought to the surface first, where it is nearest within the sensor's site, or where other terms want it.
@@ -25,6 +25,8 @@ static const double begins = 0.3;
 static const double sharp = 0.87;
 enum { STAGES = 6 };
 
+enum { SENSED = 3 };
+
 /// Whether a link carries no other.
 static int is_last(const cav_model *m, int link) {
   for (int l = link + 1; l < m->nlink; l++)
@@ -32,7 +34,7 @@ static int is_last(const cav_model *m, int link) {
   return 1;
 }
 
-/// How well a geom serves to push: 2 of a hand, 1 of the last link of a limb, 0 of others.
+/// How well a geom serves to push: SENSED of what a sensor is to feel, 2 of a hand, 1 of the last link of a limb, 0 of others.
 static int grade_of(const cav_model *m, const cav_roles *roles, int geom) {
   const int link = m->geom[geom].link, hand[] = {CAV_ROLE_RIGHT_HAND, CAV_ROLE_LEFT_HAND, CAV_ROLE_HAND};
   for (int k = 0; k < 3; k++)
@@ -40,9 +42,10 @@ static int grade_of(const cav_model *m, const cav_roles *roles, int geom) {
   return is_last(m, link);
 }
 
-/// The geom of a driven tree that can touch the link, serves best and of these is nearest to a place; -1: there is none.
+/// The geom of a driven tree that can touch the link, serves best and of these is nearest to a place; -1: there is none. One that
+/// a sensor is to feel serves best.
 static cav_status find_geom(const cav_model *m, cav_state *state, const double *q, int link, const double place[3],
-                            int *best) {
+                            const cav_sensor *feels, int *best) {
   cav_roles roles;
   int best_grade = -1;
   double least = INFINITY;
@@ -57,7 +60,7 @@ static cav_status find_geom(const cav_model *m, cav_state *state, const double *
     double arm[3];
     cav_object_pose(m, state, CAV_OBJECT_GEOM, geom, &pose);
     sub3(arm, pose.pos, place);
-    const int grade = grade_of(m, &roles, geom);
+    const int grade = feels && cav_touch_sees(m, feels, geom) ? SENSED : grade_of(m, &roles, geom);
     if (grade < best_grade || (grade == best_grade && norm3(arm) >= least)) continue;
     best_grade = grade, least = norm3(arm), *best = geom;
   }
@@ -86,6 +89,7 @@ static void lay(const cav_model *m, const cav_state *state, const cav_thing *t, 
   const int body = m->link[t->link].body;
   cav_pose pose;
   find_place(m, state, t, geom, away, hand->place);
+  hand->hung = t->joint >= 0;
   hand->found = isfinite(hand->place[2]) ? CAV_HAND_TERMS : 0; // not where it touches by listed pairs alone
   cav_object_pose(m, state, CAV_OBJECT_XBODY, body, &pose);
   column3(hand->upright, pose.rotation, 2);
@@ -93,10 +97,17 @@ static void lay(const cav_model *m, const cav_state *state, const cav_thing *t, 
   hand->term[0].sensor.referred = 1, hand->term[0].sensor.reference_type = CAV_OBJECT_XBODY;
   hand->term[0].sensor.reference = body;
   hand->term[0].from = begins * t->time;
+  hand->term[0].to = t->time;
+  // a hinge or a slide keeps it from tumbling
+  const int still = hand->hung ? 1 : 2;
+  const cav_object_type kind = hand->hung ? CAV_OBJECT_BODY : CAV_OBJECT_XBODY;
+  if (hand->found) hand->found = still + 1;
   hand->term[1] = cav_leading_term(CAV_SENSOR_FRAMEZAXIS, CAV_OBJECT_XBODY, body, hand->upright);
+  hand->term[1].to = t->time;
+  cav_object_pose(m, state, kind, body, &pose);
   copy3(hand->still, pose.pos);
-  hand->term[2] = cav_leading_term(CAV_SENSOR_FRAMEPOS, CAV_OBJECT_XBODY, body, hand->still);
-  for (int i = 0; i < CAV_HAND_TERMS; i++) hand->term[i].to = i == 2 ? hand->term[0].from : t->time;
+  hand->term[still] = cav_leading_term(CAV_SENSOR_FRAMEPOS, kind, body, hand->still);
+  hand->term[still].to = hand->term[0].from;
 }
 
 /// What has to be touched: what a touch sensor looks at that is to feel a force, and when.
@@ -274,12 +285,14 @@ cav_status cav_hand_find(const cav_problem *problem, double away, cav_hand *hand
   cav_state *state = cav_state_new(m);
   cav_status status = state ? cav_thing_find(problem, 0, state, &t) : CAV_NO_MEMORY;
   int geom = -1;
+  touched touch = {.sensor = NULL};
+  const int feels = find_touched(problem, &touch);
   if (!status && t.link) status = cav_position(m, state, problem->q_start);
-  if (!status && t.link) status = find_geom(m, state, problem->q_start, t.link, state->link[t.link].pos, &geom);
+  if (!status && t.link)
+    status = find_geom(m, state, problem->q_start, t.link, state->link[t.link].pos, feels ? touch.sensor : NULL, &geom);
   if (!status && geom >= 0) lay(m, state, &t, geom, away, hand);
-  touched touch;
   meeting one = {.mover = -1};
-  if (!status && !hand->found && find_touched(problem, &touch)) status = find_meeting(problem, state, &touch, &one);
+  if (!status && !hand->found && feels) status = find_meeting(problem, state, &touch, &one);
   if (!status && one.mover >= 0) lay_meeting(m, state, &touch, &one, away, hand);
   cav_state_free(state);
   return status;

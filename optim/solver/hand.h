@@ -6,12 +6,13 @@
 
 enum { CAV_HAND_TERMS = 3 };
 
-/// Terms that bring a geom of a driven tree to the side of a body that it is to be pushed from, keep the body from tumbling
+/// Terms that bring a geom of a driven tree to the side of a body that it is to be pushed from, keep a free body from tumbling
 /// towards it, and where it is until then; or one that brings what is to be touched and what touches it together.
 typedef struct cav_hand {
   int found; ///< number of terms; 0: nothing that no actuator moves is asked for elsewhere along the ground, no force is
              ///< asked of a touch sensor, or nothing reaches it
   int touches;                   ///< 1: it is for a touch sensor
+  int hung;                      ///< 1: the body turns on a hinge or slides in the world
   cav_term term[CAV_HAND_TERMS]; ///< they borrow what follows
   double place[3];               ///< m, of the geom in the frame of the body
   double upright[3];             ///< z axis of the body at the start

@@ -57,6 +57,7 @@ static cav_status descend(cav_solve_run *run) {
       alone = stages < 2 || run->options->first_stage > stages;
   cav_status status = cav_sqp(run, &left, alone ? NULL : &stuck);
   if (status == CAV_OK && stuck && !run->refused) status = cav_run_screen(run);
+  if (status == CAV_OK && stuck && !run->refused) status = cav_run_screen_feedback(run);
   if (run->refused) return status;
   int rest = left;
   double cost = cav_transcription_cost(run->tr);

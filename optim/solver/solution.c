@@ -107,36 +107,66 @@ static cav_status find_rows(cav_solve_run *run) {
 /// Times its tolerance from which on what a motion misses is not met by polish (METHOD.md, 7).
 static const double beyond_polish = 1.5;
 
-cav_status cav_run_screen(cav_solve_run *run) {
+/// How many times its tolerance the worst of what a certificate asks without feedback is; 0 where that is not known.
+static cav_status find_excess(const cav_solve_run *run, double *excess) {
   cav_verdict v = {0};
   cav_error ignored = {0};
-  // what leads to another solve is not to be certified; what begins at the end may be far from its optimum, its rows held
-  if (!run->options->leave_refused || !run->options->gains || run->options->first_stage > run->problem->schedule.stages)
-    return CAV_OK;
   const cav_options law = run->tr->options;
   const cav_status status = cav_verify(run->problem, run->at, &law, NULL, NULL, &v, &ignored);
-  if (status == CAV_NO_MEMORY) return status;
-  // what cannot be verified is told of at the end
-  if (status != CAV_OK) return CAV_OK;
   const double over[] = {v.slip_mean_m_s / CAV_TOLERANCE_SLIP, v.hover_fraction / CAV_TOLERANCE_HOVER,
                          v.momentum_defect_rms / CAV_TOLERANCE_MOMENTUM,
                          v.penetration_max_m / CAV_TOLERANCE_PENETRATION,
                          v.penetration_between_m / CAV_TOLERANCE_PENETRATION};
-  for (size_t i = 0; i < sizeof over / sizeof *over; i++) run->refused |= over[i] > beyond_polish;
-  return CAV_OK;
+  *excess = 0;
+  for (size_t i = 0; i < sizeof over / sizeof *over && status == CAV_OK; i++) *excess = fmax(*excess, over[i]);
+  // what cannot be verified is told of at the end
+  return status == CAV_NO_MEMORY ? status : CAV_OK;
 }
 
-/// Sets of gains that are tried of a motion that ends soon.
-enum { LAST_SETS = 8 };
+/// Whether motions that no certificate is in sight of are left. What leads to another solve is not to be certified; what begins
+/// at the end may be far from its optimum, its rows held.
+static int leaves(const cav_solve_run *run) {
+  return run->options->leave_refused && run->options->gains &&
+         run->options->first_stage <= run->problem->schedule.stages;
+}
+
+cav_status cav_run_screen(cav_solve_run *run) {
+  double excess = 0;
+  const cav_status status = leaves(run) ? find_excess(run, &excess) : CAV_OK;
+  run->refused |= excess > beyond_polish;
+  return status;
+}
+
+/// Sets of gains that are tried of a motion that ends soon, and of one that is stuck.
+enum { LAST_SETS = 8, STUCK_SETS = 16 };
+
+cav_status cav_run_screen_feedback(cav_solve_run *run) {
+  cav_error ignored = {0};
+  if (!leaves(run) || !cav_run_certifiable(run) || !cav_run_within_limits(run)) return CAV_OK;
+  int follows = 0;
+  run->phase = "feedback";
+  run->stage = run->stages = 1;
+  run->solution->contact = run->tr->options;
+  run->solution->cost = cav_transcription_cost(run->tr);
+  cav_status status = cav_choose_gains(run->problem, run->tr, run->at, STUCK_SETS, cav_run_feedback, run, run->solution,
+                                       &follows, &ignored);
+  // its gains say where it is lost; those of a motion that goes on are found at its end
+  run->refused = status == CAV_OK && run->solution->gain_q && !follows;
+  if (!run->refused) cav_gains_free(run->solution);
+  return status == CAV_NO_MEMORY || status == CAV_INTERRUPTED ? status : CAV_OK;
+}
 
 /// Gains, of what may be certified with them.
 static cav_status find_gains(cav_solve_run *run, int interrupted, cav_error *error) {
   if (!run->options->gains || run->refused || !cav_run_certifiable(run) || !cav_run_within_limits(run)) return CAV_OK;
+  double excess = 0;
+  cav_status status = leaves(run) ? find_excess(run, &excess) : CAV_OK;
+  if (status != CAV_OK) return status;
   run->phase = "feedback";
   run->stage = run->stages = 1;
-  // a motion whose rows do not quite hold is not worth more than one set
-  int sets = interrupted ? LAST_SETS : cav_run_met(run) ? 0 : 1;
-  return cav_choose_gains(run->problem, run->tr, run->at, sets, cav_run_feedback, run, run->solution, error);
+  // a motion whose rows do not quite hold, or that is refused whatever they do, is not worth more than one set
+  int sets = interrupted ? LAST_SETS : cav_run_met(run) && excess <= 1 ? 0 : 1;
+  return cav_choose_gains(run->problem, run->tr, run->at, sets, cav_run_feedback, run, run->solution, NULL, error);
 }
 
 /// What the solution says of its last iterate, and its gains unless it was interrupted and ends at once.

@@ -300,8 +300,10 @@ static cav_status add_pushed(const cav_problem *problem, cav_strategy *strategy,
       : hand.touches
           ? "with what is to touch brought there first, contacts sharp from there on"
           : "with a hand brought first to the side that what has to move is pushed from, contacts sharp from there on";
-  g->led = (carry.found || (hangs(problem->model) && !hand.touches)) && !g->decorated && !g->collides && !g->sinks &&
-           problem->guess == CAV_GUESS_INTERPOLATE && !cav_upright_held(problem);
+  // a door swings by little: what pushes it is often found by the stated guess
+  const int hung = carry.hung || hand.hung;
+  g->led = (carry.found || (hangs(problem->model) && !hand.touches)) && !hung && !g->decorated && !g->collides &&
+           !g->sinks && problem->guess == CAV_GUESS_INTERPOLATE && !cav_upright_held(problem);
   if (g->led)
     begin_with(strategy, &push);
   else

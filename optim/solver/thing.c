@@ -3,6 +3,8 @@
 #include "thing.h"
 
 #include <math.h>
+#include <stdlib.h>
+#include <string.h>
 
 #include "math3.h"
 #include "quantity.h"
@@ -49,14 +51,73 @@ static void add_term(const cav_problem *p, const cav_term *term, cav_state *stat
   found->time = to;
 }
 
-/// The first link that terms ask for elsewhere; link 0: none.
-static void find_of_terms(const cav_problem *p, int lifted, cav_state *state, cav_thing *found) {
-  for (int l = 1; l < p->model->nlink && !found->link; l++) {
-    if (!is_left(p->model, l)) continue;
-    cav_thing one = {.link = l, .first = p->duration};
-    for (int i = 0; i < p->nterm; i++) add_term(p, &p->term[i], state, &one);
-    if (is_moved(&one, lifted)) *found = one;
+/// The joint by which what no actuator moves turns or slides in the world; -1: it does not, or by more than one.
+static int hung_by(const cav_model *m, int link) {
+  const cav_link *l = &m->link[link];
+  if (l->root != link || l->njoint != 1) return -1;
+  return m->joint[l->joint].type == CAV_JOINT_HINGE || m->joint[l->joint].type == CAV_JOINT_SLIDE ? l->joint : -1;
+}
+
+/// The centre of a link's mass.
+static void centre_of(const cav_model *m, const cav_state *state, int link, double centre[3]) {
+  transform(centre, state->link[link].pos, state->link[link].rotation, m->link[link].com);
+}
+
+/// The way of a hung link's centre from the start to a posture q. The state comes there.
+static cav_status way_to(const cav_problem *p, const double *q, cav_state *state, cav_thing *found) {
+  double start[3];
+  cav_status status = cav_position(p->model, state, p->q_start);
+  if (status) return status;
+  centre_of(p->model, state, found->link, start);
+  if ((status = cav_position(p->model, state, q))) return status;
+  centre_of(p->model, state, found->link, found->way);
+  sub3(found->way, found->way, start);
+  found->angle = q[p->model->joint[found->joint].q];
+  return CAV_OK;
+}
+
+/// Where terms ask for a joint last, the start's where none does.
+static double joint_asked(const cav_problem *p, int joint, cav_thing *found) {
+  const double start = p->q_start[p->model->joint[joint].q];
+  double last = start;
+  for (int i = 0; i < p->nterm; i++) {
+    const cav_term *term = &p->term[i];
+    const cav_sensor *s = &term->sensor;
+    if (term->quantity != CAV_QUANTITY_SENSOR || s->type != CAV_SENSOR_JOINTPOS || s->object != joint) continue;
+    const double to = term->to < 0 ? p->duration : fmin(term->to, p->duration);
+    if (!cav_term_asks(term) || to < found->time) continue;
+    if (term->use == CAV_USE_RANGE)
+      last = fmin(fmax(start, term->lower), term->upper);
+    else
+      cav_term_target(term, to, 1, &last);
+    found->time = to, found->first = fmin(found->first, fmin(fmax(term->from, 0), to));
   }
+  return last;
+}
+
+/// Of a link that is hung in the world what terms ask for its joint.
+static cav_status add_joint(const cav_problem *p, cav_state *state, cav_thing *found) {
+  const size_t bytes = (size_t)p->model->nq * sizeof(double);
+  double *q = malloc(bytes);
+  if (!q) return CAV_NO_MEMORY;
+  memcpy(q, p->q_start, bytes);
+  q[p->model->joint[found->joint].q] = joint_asked(p, found->joint, found);
+  cav_status status = way_to(p, q, state, found);
+  free(q);
+  return status ? status : cav_position(p->model, state, p->q_start);
+}
+
+/// The first link that terms ask for elsewhere; link 0: none. The state is at the start.
+static cav_status find_of_terms(const cav_problem *p, int lifted, cav_state *state, cav_thing *found) {
+  cav_status status = CAV_OK;
+  for (int l = 1; l < p->model->nlink && !found->link && !status; l++) {
+    if (!is_left(p->model, l)) continue;
+    cav_thing one = {.link = l, .joint = hung_by(p->model, l), .first = p->duration};
+    if (one.joint >= 0) status = add_joint(p, state, &one);
+    for (int i = 0; i < p->nterm && one.joint < 0; i++) add_term(p, &p->term[i], state, &one);
+    if (!status && is_moved(&one, lifted && one.joint < 0)) *found = one;
+  }
+  return status;
 }
 
 /// What the goal has elsewhere than the start, if no term asks for anything. The state is at the start, and comes to the goal.
@@ -65,22 +126,25 @@ static cav_status find_of_goal(const cav_problem *p, int lifted, cav_state *stat
   if (p->cycle.on) return CAV_OK;
   for (int l = 1; l < m->nlink && !found->link; l++) {
     if (!is_left(m, l) || m->link[l].root != l) continue;
-    cav_thing one = {.link = l, .first = p->duration, .time = p->duration};
-    cav_status status = cav_position(m, state, p->q_start);
+    cav_thing one = {.link = l, .joint = hung_by(m, l), .first = p->duration, .time = p->duration};
+    const int hung = one.joint >= 0;
+    cav_status status = hung ? way_to(p, p->q_goal, state, &one) : cav_position(m, state, p->q_start);
+    if (!status && !hung) {
+      scale3(one.way, -1, state->link[l].pos);
+      status = cav_position(m, state, p->q_goal);
+      add3(one.way, one.way, state->link[l].pos);
+      one.rise = one.way[2];
+    }
     if (status) return status;
-    scale3(one.way, -1, state->link[l].pos);
-    if ((status = cav_position(m, state, p->q_goal))) return status;
-    add3(one.way, one.way, state->link[l].pos);
-    one.rise = one.way[2];
-    if (is_moved(&one, lifted)) *found = one;
+    if (is_moved(&one, lifted && !hung)) *found = one;
   }
   return CAV_OK;
 }
 
 cav_status cav_thing_find(const cav_problem *problem, int lifted, cav_state *state, cav_thing *thing) {
-  *thing = (cav_thing){.link = 0};
+  *thing = (cav_thing){.link = 0, .joint = -1};
   cav_status status = cav_position(problem->model, state, problem->q_start);
-  if (!status) find_of_terms(problem, lifted, state, thing);
+  if (!status) status = find_of_terms(problem, lifted, state, thing);
   return status || thing->link ? status : find_of_goal(problem, lifted, state, thing);
 }
 
@@ -112,7 +176,7 @@ double cav_thing_surface(const cav_model *m, const cav_state *state, int link, c
                          double *lowest) {
   static const double down[3] = {0, 0, 1};
   double out = 0;
-  transform(centre, state->link[link].pos, state->link[link].rotation, m->link[link].com);
+  centre_of(m, state, link, centre);
   *lowest = INFINITY;
   for (int g = 0; g < m->ngeom; g++) {
     if (m->geom[g].link != link || !(m->geom[g].contype || m->geom[g].conaffinity)) continue;

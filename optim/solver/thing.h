@@ -6,6 +6,8 @@
 
 typedef struct cav_thing {
   int link;      ///< 0: there is none
+  int joint;     ///< by which it turns or slides in the world, the way being that of its centre of mass; -1: it is free
+  double angle;  ///< rad or m, of that joint, where it is asked for last
   double way[3]; ///< m, from where it is at the start to where it is asked for last
   double first;  ///< s, when it is first asked for elsewhere
   double time;   ///< s, when it is asked for last
@@ -15,7 +17,8 @@ typedef struct cav_thing {
 /// m: a way from which a thing has to be moved.
 #define CAV_THING_WAY 0.02
 
-/// The first link that terms ask for elsewhere, or else the goal: along the ground, with lifted also up. CAV_NO_MEMORY, or what
+/// The first link that terms ask for elsewhere, or else the goal: along the ground, with lifted also up. What turns on a hinge or
+/// slides, a door or a drawer, is asked for by its joint's angle or place. CAV_NO_MEMORY, or what
 /// the dynamics says of start and goal; the state is at one of them after that.
 cav_status cav_thing_find(const cav_problem *problem, int lifted, cav_state *state, cav_thing *thing);
 
