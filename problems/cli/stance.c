@@ -57,6 +57,24 @@ static void print_touch(const cav_model *m, const cav_state *state) {
     printf(", touches nothing of the world");
 }
 
+// the centre of mass of what actuators move, things of the scene aside; of all where they move nothing. The state is at a posture
+static void find_centre(const cav_model *m, const cav_state *state, double com[3]) {
+  int driven = 0;
+  double mass = 0;
+  for (int k = 0; k < 3; k++) com[k] = 0;
+  for (int l = 1; l < m->nlink; l++) driven |= m->link[l].driven;
+  for (int l = 1; l < m->nlink; l++) {
+    const cav_link *link = &m->link[l];
+    const cav_pose *pose = &state->link[l];
+    if (driven && !link->driven) continue;
+    mass += link->mass;
+    for (int k = 0; k < 3; k++)
+      com[k] += link->mass * (pose->pos[k] + pose->rotation[3 * k] * link->com[0] +
+                              pose->rotation[3 * k + 1] * link->com[1] + pose->rotation[3 * k + 2] * link->com[2]);
+  }
+  for (int k = 0; k < 3 && mass > 0; k++) com[k] /= mass;
+}
+
 cav_status cav_command_print_stance(const cav_problem *p, const char *name, const double *q, cav_error *error) {
   cav_state *state = cav_state_new(p->model);
   double com[3];
@@ -71,7 +89,7 @@ cav_status cav_command_print_stance(const cav_problem *p, const char *name, cons
              cav_status_name(status));
     return status;
   }
-  cav_momentum(p->model, state, p->v_start, com, NULL, NULL);
+  find_centre(p->model, state, com);
   printf("  %-6s centre of mass at %.3f %.3f %.3f m", name, com[0], com[1], com[2]);
   print_touch(p->model, state);
   const cav_contact *deepest = cav_command_deepest(state);

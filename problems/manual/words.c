@@ -75,14 +75,16 @@ static const struct {
      "component"},
     {"unit|units|metre|metres|meter|meters|radian|radians",
      "m, s, kg, N and rad; degrees in the attributes degrees, euler and rotation alone", NULL},
-    {"floor|ground|plane|table|box|wall|obstacle|obstacles|object|objects|stairs|ball|terrain|environment",
+    {"floor|ground|plane|table|box|wall|object|objects|stairs|ball|terrain|environment",
      "what the model's file does not have stands in <scene>, as MJCF writes it:\n"
      "  <scene><geom name=\"floor\" type=\"plane\" size=\"0 0 1\"/></scene>; height=\"floor\" of a posture puts it "
      "down "
      "there",
      "height"},
     {"mjcf|urdf|mujoco|robot|humanoid",
-     "models are MJCF or URDF files: <problem model=\"FILE\">, from the problem file's folder, or --model FILE",
+     "models are MJCF or URDF files: <problem model=\"FILE\">, its path from the problem file's folder or from /, or "
+     "--model "
+     "FILE",
      "model"},
     {"objective|reward|loss|goals|wish", "what is wanted is a term of <cost>, what has to hold one of <constraint>",
      "terms"},
@@ -105,10 +107,27 @@ static const struct {
      "contacts are found, no file says when; friction is that of geoms, in the model's file or the <scene>", "contact"},
     {"dt|knot|step|steps|fps|length", "knots are timestep apart, duration is a whole number of steps", "horizon"},
     {"touching|press|pressure|lean|support|bear",
-     "a force on a body: <sensor type=\"touch\" body=\"right hand\" target=\"20\" within=\"5\" from=\"0.8\" to=\"1.2\" "
-     "weight=\"100\"/>;\n  none on it: <constraint><sensor type=\"touch\" body=\"table\" upper=\"0\"/></constraint>",
+     "a force on a body: <sensor type=\"touch\" body=\"right hand\" target=\"20\" scale=\"20\" within=\"5\" "
+     "from=\"0.8\" "
+     "to=\"1.2\"\n  weight=\"30\"/>, its scale about its target; none on it: help avoid",
      "touch"},
-    {"jump|walk|kick|climb|backflip|cartwheel|dance|motions|examples",
+    {"avoid|avoided|untouched|collision|collisions|obstacle|obstacles",
+     "what must not be touched is a body of its own in <scene>, without joints. A cost on its forces keeps off it, and "
+     "is "
+     "often\n  easier to find: <force body=\"bar\" weight=\"100\"/>. That it was not touched, by more than 5 N, is "
+     "asked by\n"
+     "  <sensor type=\"touch\" body=\"bar\" within=\"5\" weight=\"0.01\"/> beside it, or of every solution by a "
+     "constraint:\n"
+     "  <constraint><sensor type=\"touch\" body=\"bar\" upper=\"0\"/></constraint>",
+     "force"},
+    {"door|doors|drawer|lid|lever|hinge|gate|push|pull|carry|lift|throw|move",
+     "what no actuator moves stands in <scene> as a <body> with a <freejoint>, or with a <joint type=\"hinge\"> or "
+     "slide; "
+     "it is wanted\n  by its place, <sensor type=\"framepos\" body=\"box\" .../>, or its joint, <sensor "
+     "type=\"jointpos\" "
+     "joint=\"door\" .../>, and hands are\n  brought to it. What nothing stops at the end: <horizon close=\"open\"/>",
+     "jointpos"},
+    {"jump|hop|walk|kick|climb|crawl|roll|backflip|cartwheel|handstand|dance|motions|examples",
      "motions of the project stand in problems/motions; cavort new MODEL --like jump writes one for a model", "new"},
     {"output|folder|csv|trajectory|json|files",
      "cavort solve writes a folder, NAME.result; its files: problems/README.md, Result folders", "solve"},
