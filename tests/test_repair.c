@@ -54,8 +54,18 @@ static void check_targets(repaired *r) {
     cav_strategy mended;
     int found;
     r->term[0].from = held ? 0.5 : from;
-    CHECK(cav_strategy_repair(&r->problem, &r->stated, &missed, 1, &mended, &found) == CAV_OK && found);
+    CHECK(cav_strategy_repair(&r->problem, &r->stated, &missed, 2, &mended, &found) == CAV_OK && found);
     CHECK(mended.nterm == 2 && mended.term[0].weight == 9000 && !strcmp(mended.changed, "weights of goals 10 times"));
+    CHECK(!mended.schedule.kinematics);
+    cav_strategy_clear(&mended);
+    // before that from where it is met by inverse kinematics; once that is so it is no cure
+    CHECK(cav_strategy_repair(&r->problem, &r->stated, &missed, 1, &mended, &found) == CAV_OK && found);
+    CHECK(mended.term[0].weight == 9000 && mended.schedule.kinematics && mended.effort_limit == r->stated.effort_limit);
+    CHECK_TEXT(mended.changed, "weights of goals 10 times, kinematics=\"true\"");
+    cav_strategy again;
+    CHECK(cav_strategy_repair(&r->problem, &mended, &missed, 1, &again, &found) == CAV_OK && found);
+    CHECK_TEXT(again.changed, mended.changed);
+    cav_strategy_clear(&again);
     cav_strategy_clear(&mended);
   }
   r->term[0].from = from;
@@ -72,7 +82,7 @@ static void check_targets(repaired *r) {
     CHECK(!strcmp(mended.changed, changed[k]));
     cav_strategy_clear(&mended);
     CHECK(cav_strategy_repair(&r->problem, &r->stated, &close, 1, &mended, &found) == CAV_OK && found);
-    CHECK(!strcmp(mended.changed, k < 2 ? changed[2] : "weights of goals 10 times"));
+    CHECK(!strcmp(mended.changed, k < 2 ? changed[2] : "weights of goals 10 times, kinematics=\"true\""));
     cav_strategy_clear(&mended);
   }
 }
@@ -221,7 +231,7 @@ static void check_goals(repaired *r) {
   int found;
   CHECK(cav_strategy_repair(&r->problem, &r->stated, &hangs, 0, &once, &found) == CAV_OK && found &&
         once.effort_limit == 0.9);
-  CHECK(cav_strategy_repair(&r->problem, &once, &hangs, 1, &twice, &found) == CAV_OK && found &&
+  CHECK(cav_strategy_repair(&r->problem, &once, &hangs, 2, &twice, &found) == CAV_OK && found &&
         twice.term[0].weight == 9000);
   CHECK(twice.term[1].weight == 200 && !strcmp(twice.changed, "weights of goals 10 times, <limits effort=\"0.9\"/>"));
   cav_strategy_clear(&once), cav_strategy_clear(&twice);
@@ -239,10 +249,17 @@ static void check_goals(repaired *r) {
   two[1].name = "other";
   r->problem.term = two, r->problem.nterm = 3;
   hangs.missed_terms = 2;
-  CHECK(cav_strategy_repair(&r->problem, &r->stated, &hangs, 1, &once, &found) == CAV_OK && found && once.nterm == 3);
+  CHECK(cav_strategy_repair(&r->problem, &r->stated, &hangs, 2, &once, &found) == CAV_OK && found && once.nterm == 3);
   CHECK(once.term[0].weight == 900 && once.term[1].weight == 9000 && once.term[2].weight == 200);
   CHECK(!strcmp(once.changed, "weight of 'other' 10 times"));
   cav_strategy_clear(&once);
+  // weights that grew by different factors are told one by one: what weighs one of ten times as much twice more is another one
+  for (int k = 0; k < 2; k++) two[k].name = k ? "other" : "there", two[k].weight = 900;
+  CHECK(cav_strategy_repair(&r->problem, &r->stated, &hangs, 1, &once, &found) == CAV_OK && found);
+  cav_verdict little = {.certified = 1, .missed_terms = 2, .missed_most = 1.2};
+  CHECK(cav_strategy_repair(&r->problem, &once, &little, 0, &twice, &found) == CAV_OK && found);
+  CHECK_TEXT(twice.changed, "weight of 'there' 10 times, weight of 'other' 24 times, kinematics=\"true\"");
+  cav_strategy_clear(&once), cav_strategy_clear(&twice);
   r->problem.term = r->term, r->problem.nterm = 2, hangs.missed_terms = 0;
   // less effort than usual was asked for
   r->problem.effort_limit = 0.3;

@@ -17,6 +17,7 @@ typedef enum cure {
   NONE,
   FORCE,     ///< contact forces cost something: loads are spread, and nothing stands on an edge
   GOALS,     ///< heavier weights of goals
+  ANEW,      ///< the same, from where targets are met by inverse kinematics
   BIT,       ///< a bit heavier ones, as much as what is missed needs
   SLIP,      ///< a heavier weight of slip
   OFF,       ///< so much that what need not touch anything does not
@@ -60,7 +61,7 @@ static const cure *cures_of(const cav_problem *p, const cav_verdict *v) {
   static const cure forces[] = {EFFORT, STEP, NONE}, deep[] = {SOFTNESS, STEP, NONE}, between[] = {STEP, NONE},
                     turned[] = {ORDER, STEP, NONE}, slip[] = {SMOOTHING, SLIP, SOFTNESS},
                     rub[] = {SELF, SMOOTHING, SLIP}, limbs[] = {CLOSER, SELF, STEP}, hover[] = {GAP, SMOOTHING, STEP},
-                    fold[] = {SLIDING, STEP, NONE}, lost[] = {FORCE, STEP, SLACK}, target[] = {EFFORT, GOALS, NONE},
+                    fold[] = {SLIDING, STEP, NONE}, lost[] = {FORCE, STEP, SLACK}, target[] = {EFFORT, ANEW, GOALS},
                     close[] = {BIT, EFFORT, GOALS}, fades[] = {SMOOTHING, GAP, STEP}, near[] = {STEP, SLACK, NONE},
                     again[] = {STEP, SLIDING, NONE}, off_slip[] = {OFF, SMOOTHING, SLIP},
                     off_hover[] = {OFF, GAP, SMOOTHING}, ground[] = {STEP, LOOSE, SOFTER}, none[] = {NONE};
@@ -161,8 +162,8 @@ static cav_status loosen_slip(const cav_problem *p, cav_strategy *s) {
 
 /// Whether a cure changes what the motion does, not what contacts obey.
 static int is_of_motion(cure c) {
-  return c == FORCE || c == OFF || c == SELF || c == GOALS || c == BIT || c == SLIP || c == LOOSE || c == EFFORT ||
-         c == SLACK;
+  return c == FORCE || c == OFF || c == SELF || c == GOALS || c == ANEW || c == BIT || c == SLIP || c == LOOSE ||
+         c == EFFORT || c == SLACK;
 }
 
 static cav_status change(const cav_problem *p, const cav_verdict *v, cure c, cav_strategy *s) {
@@ -178,6 +179,10 @@ static cav_status change(const cav_problem *p, const cav_verdict *v, cure c, cav
       return weigh_forces(p, CAV_QUANTITY_SELF_FORCE, self_weight, s);
     case GOALS:
       return weigh_goals(p, v, heavier, s);
+    case ANEW: // all of them, so that none gives way to the others
+      if (s->schedule.kinematics) break;
+      s->schedule.kinematics = 1;
+      return weigh_goals(p, &(cav_verdict){.missed_terms = 0}, heavier, s);
     case BIT:
       return weigh_goals(p, v, enough(v), s);
     case SLIP:
@@ -235,16 +240,20 @@ static void describe(const cav_problem *p, cav_strategy *s) {
   char *out = s->changed;
   size_t room = sizeof s->changed;
   *out = 0;
-  int goals = 0, heavy = 0;
+  int goals = 0, heavy = 0, alike = 1;
+  double all = 0;
   for (int i = 0; i < p->nterm && s->term; i++) {
     if (!is_goal(p, &p->term[i]) || !(p->term[i].weight > 0)) continue;
+    const double times = s->term[i].weight / p->term[i].weight;
     goals++, heavy += s->term[i].weight != p->term[i].weight;
+    alike &= goals == 1 || fabs(times - all) <= 1e-12 * all;
+    all = times;
   }
   for (int i = 0; i < p->nterm && heavy; i++) {
     size_t n = strlen(out);
     double times = p->term[i].weight > 0 ? s->term[i].weight / p->term[i].weight : 1;
     if (!is_goal(p, &p->term[i]) || times == 1) continue;
-    if (heavy == goals) {
+    if (heavy == goals && alike) {
       snprintf(out, room, ", weights of goals %g times", times);
       break;
     }
@@ -281,10 +290,11 @@ static void describe(const cav_problem *p, cav_strategy *s) {
     if (number[i].differs) snprintf(out + n, room - n, number[i].format, number[i].value);
   }
   size_t n = strlen(out);
-  snprintf(out + n, room - n, "%s%s%s%s", s->order != p->order ? ", order=\"momentum\"" : "",
+  snprintf(out + n, room - n, "%s%s%s%s%s", s->order != p->order ? ", order=\"momentum\"" : "",
            s->schedule.sliding != p->schedule.sliding ? ", sliding=\"convex\"" : "",
            s->schedule.next_gap != p->schedule.next_gap ? ", next_gap=\"exact\"" : "",
-           s->schedule.solids != p->schedule.solids ? ", solids=\"grow\"" : "");
+           s->schedule.solids != p->schedule.solids ? ", solids=\"grow\"" : "",
+           s->schedule.kinematics != p->schedule.kinematics ? ", kinematics=\"true\"" : "");
   if (*out) memmove(out, out + 2, strlen(out + 2) + 1);
 }
 

@@ -70,8 +70,8 @@ void cav_command_tell_guess(FILE *out, const cav_problem *p, int whole) {
     tell(p->model, &way, p->timestep, 1, text, sizeof text);
     fprintf(
         out,
-        "note: the guess runs into a solid, %s (cavort view PROBLEM shows it): solve looks for a way over or round it, "
-        "or give <waypoint>s\n",
+        "note: the guess runs into a solid, %s (cavort view PROBLEM shows it): solve begins over or round it or, where "
+        "this fails, looks for such a way, or give <waypoint>s\n",
         text);
   }
   cav_trajectory_free(guess);

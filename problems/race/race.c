@@ -595,8 +595,9 @@ static void settle(cav_race *race, int i) {
   const int mends = e->strategy.use == CAV_STRATEGY_REPAIR || e->strategy.use == CAV_STRATEGY_NEAR;
   const int near = e->strategy.use == CAV_STRATEGY_NEAR;
   if (!mends || *e->strategy.changed || !find_repair(race, i, &repaired, &of, &cure)) return;
-  // what a repair led to is not sought anew by the next one
-  const int goes_on = near || *race->entry[of].strategy.changed;
+  // what a repair led to is not sought anew by the next one, unless it is to begin elsewhere
+  const int anew = repaired.schedule.kinematics && !race->entry[of].strategy.schedule.kinematics;
+  const int goes_on = !anew && (near || *race->entry[of].strategy.changed);
   if (goes_on) e->from = of;
   e->mends = of, e->cure = cure;
   e->strategy = repaired;
