@@ -112,6 +112,8 @@ static void tell_heavier(const char *folder, const char *name, double more, doub
     const double times = times_of(t.changed, name);
     if (t.kept) kept = times;
     if (!(times > most) || strncmp(t.outcome, "not ", 4) || !strcmp(t.outcome, "not tried")) continue;
+    // what began elsewhere tells nothing of more weight here
+    if (strstr(t.changed, "kinematics=")) continue;
     most = times;
     const char *end = strstr(t.reason, ": wanted"), *stop = strstr(t.reason, ". ");
     if (!end || (stop && stop < end)) end = stop;
