@@ -195,6 +195,20 @@ static void test_door(void) {
   // the hand that the touch sensor is to feel
   CHECK_TEXT(p->model->geom[hand.term[0].sensor.object].name, "hand_right");
   CHECK(hand.term[1].sensor.object_type == CAV_OBJECT_BODY && hand.term[1].to == hand.term[0].from);
+  // the same door asked for by the place of its middle, not by its joint, is pushed as any other thing
+  cav_term term[40];
+  double place[3] = {c.there[0], c.there[1], c.there[2]};
+  CHECK(p->nterm <= 40);
+  memcpy(term, p->term, (size_t)p->nterm * sizeof *term);
+  for (int k = 0; k < p->nterm; k++)
+    if (term[k].sensor.type == CAV_SENSOR_JOINTPOS) {
+      term[k].sensor = (cav_sensor){.name = "", .type = CAV_SENSOR_FRAMEPOS, .dim = 3, .object_type = CAV_OBJECT_BODY};
+      term[k].sensor.object = cav_object_find(p->model, CAV_OBJECT_BODY, "door");
+      term[k].component = -1, term[k].target = place;
+    }
+  cav_problem placed = *p;
+  placed.term = term;
+  CHECK(cav_hand_find(&placed, 1, &hand) == CAV_OK && hand.found == 3 && !hand.hung);
   cav_problem_free(p);
 }
 

@@ -114,7 +114,10 @@ static cav_status find_of_terms(const cav_problem *p, int lifted, cav_state *sta
     if (!is_left(p->model, l)) continue;
     cav_thing one = {.link = l, .joint = hung_by(p->model, l), .first = p->duration};
     if (one.joint >= 0) status = add_joint(p, state, &one);
-    for (int i = 0; i < p->nterm && one.joint < 0; i++) add_term(p, &p->term[i], state, &one);
+    // asked for by a place, it is as any other thing
+    if (one.joint >= 0 && !status && !is_moved(&one, 0))
+      one = (cav_thing){.link = l, .joint = -1, .first = p->duration};
+    for (int i = 0; i < p->nterm && one.joint < 0 && !status; i++) add_term(p, &p->term[i], state, &one);
     if (!status && is_moved(&one, lifted && one.joint < 0)) *found = one;
   }
   return status;
