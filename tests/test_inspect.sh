@@ -127,6 +127,9 @@ says out "the first is number 0, 'actuator 1 (of joint 'pivot')'): a plan may ta
 line() { sed -n "s/^$1  *[a-z]* .*  + \(.*\)/\1/p" out; }
 joint() { check "$1: + $2, not + $(line "$1")" [ "$(line "$1")" = "$2" ]; }
 inspected 0 "$root/problems/models/humanoid.xml"
+says out "knee_right           hinge  -149..1.72 deg     -190..190 N m     0 deg      + foot_right forwards"
+says out "hand_right           hand_right           capsule      0.03 0.0225"
+says out "keyframes: stand, squat, prone, supine"
 joint knee_right "foot_right forwards"
 joint abdomen_z "turns pelvis to the left"
 joint ankle_y_left "foot_left down"

@@ -37,7 +37,7 @@ static const cav_strategy *find(const cav_strategy *strategy, int n, const char 
 // the offered strategies' names, with blanks
 static int offers(const cav_problem *p, const char *names) {
   cav_strategy strategy[CAV_STRATEGIES];
-  char text[400] = "";
+  char text[500] = "";
   int n;
   CHECK(cav_strategy_list(p, strategy, &n) == CAV_OK);
   for (int i = 0; i < n; i++) strcat(strcat(text, i ? " " : ""), strategy[i].name);
@@ -57,10 +57,9 @@ static void test_through_ground(void) {
   int n;
   CHECK(cav_strategy_list(p, strategy, &n) == CAV_OK);
   CHECK(p->guess == CAV_GUESS_INTERPOLATE && strategy[0].guess == CAV_GUESS_HOLD && !strategy[0].stated);
-  CHECK(
-      offers(p,
-             "stated near-1 near-2 near-3 near-4 soft line slow momentum near-5 near-6 near-7 near-8 repair-1 repair-2 "
-             "repair-3 repair-4 open longer stronger"));
+  CHECK(offers(p,
+               "stated near-1 near-2 near-3 near-4 fine near-5 near-6 soft line slow momentum near-7 near-8 "
+               "near-9 near-10 repair-1 repair-2 repair-3 repair-4 open longer stronger"));
   p->guess_height = 0.3, p->guess_from = 1, p->guess_to = 2;
   CHECK(cav_strategy_list(p, strategy, &n) == CAV_OK && strategy[0].stated);
   cav_problem_free(p);
@@ -149,8 +148,8 @@ static void test_gait(const char *text, double axis, double travel) {
       p.guess = k == 1 ? CAV_GUESS_HOLD : CAV_GUESS_INTERPOLATE;
       p.guess_height = k == 2 ? 0.3 : 0;
       snprintf(list, sizeof list,
-               "stated near-1 near-2 near-3 near-4 soft %sslow momentum near-5 near-6 near-7 near-8 repair-1 repair-2 "
-               "repair-3 repair-4 open longer stronger",
+               "stated near-1 near-2 near-3 near-4 fine near-5 near-6 soft %sslow momentum near-7 near-8 "
+               "near-9 near-10 repair-1 repair-2 repair-3 repair-4 open longer stronger",
                way[k][back]);
       CHECK(offers(&p, list));
     }
@@ -158,16 +157,20 @@ static void test_gait(const char *text, double axis, double travel) {
   goal[0] += travel;
   p.nswing = 1;
   p.swing = &(cav_swing){.joint = 1, .amplitude = 0.1, .frequency = 1};
-  CHECK(offers(
-      &p,
-      "stated near-1 near-2 near-3 near-4 soft line hold slow momentum near-5 near-6 near-7 near-8 repair-1 repair-2 "
-      "repair-3 repair-4 open longer stronger"));
+  CHECK(offers(&p,
+               "stated near-1 near-2 near-3 near-4 fine near-5 near-6 soft line hold slow momentum near-7 "
+               "near-8 near-9 near-10 repair-1 repair-2 repair-3 repair-4 open longer stronger"));
   // taking one leaves the problem as it was
   CHECK(cav_strategy_list(&p, strategy, &n) == CAV_OK);
   cav_strategy_apply(&p, &strategy[0], &taken);
   CHECK(taken.nswing == 1 && taken.guess_height == 0.3 && taken.schedule.stages == p.schedule.stages);
   cav_strategy_apply(&p, find(strategy, n, "slow"), &taken);
   CHECK(taken.nswing == 1 && taken.schedule.stages == 2 * p.schedule.stages);
+  cav_strategy_apply(&p, find(strategy, n, "fine"), &taken);
+  CHECK(taken.nswing == 1 && taken.timestep == p.timestep / 2 &&
+        !strcmp(find(strategy, n, "fine")->changed, "timestep=\"0.0125\""));
+  // what mends it is what mends any other: nothing is changed in it yet
+  CHECK(!*(find(strategy, n, "fine") + 1)->changed && (find(strategy, n, "fine") + 1)->timestep == 0);
   cav_strategy_apply(&p, find(strategy, n, "longer"), &taken);
   CHECK(taken.nswing == 1 && taken.duration_least == p.duration && taken.duration_most == 2 * p.duration);
   CHECK(find(strategy, n, "longer")->use == CAV_STRATEGY_DIAGNOSIS && p.duration_most == 0);
@@ -248,9 +251,9 @@ static void check_order(cav_problem *p) {
   int n;
   p->order = CAV_ORDER_MOMENTUM;
   CHECK(offers(p,
-               "stated near-1 near-2 near-3 near-4 midpoint posture sample near-5 near-6 soft hold "
-               "slow resample near-7 near-8 near-9 near-10 near-11 near-12 repair-1 repair-2 repair-3 "
-               "repair-4 open longer stronger"));
+               "stated near-1 near-2 near-3 near-4 midpoint posture sample near-5 near-6 fine near-7 near-8 "
+               "soft hold slow resample near-9 near-10 near-11 near-12 near-13 near-14 repair-1 repair-2 "
+               "repair-3 repair-4 open longer stronger"));
   CHECK(cav_strategy_list(p, strategy, &n) == CAV_OK);
   cav_solution *straight = NULL, *round = NULL;
   runs = first_stall = last_stall = 0;
@@ -376,9 +379,9 @@ static void test_solids(void) {
   cav_problem p = cav_problem_default(m), taken;
   p.q_start = q, p.v_start = v, p.q_goal = goal;
   CHECK(offers(&p,
-               "stated near-1 near-2 near-3 near-4 solids near-5 near-6 flight near-7 near-8 repair-1 repair-2 "
-               "repair-3 repair-4 soft hold slow momentum near-9 near-10 near-11 near-12 "
-               "open longer stronger"));
+               "stated near-1 near-2 near-3 near-4 solids near-5 near-6 flight near-7 near-8 fine near-9 "
+               "near-10 repair-1 repair-2 repair-3 repair-4 soft hold slow momentum near-11 near-12 near-13 "
+               "near-14 open longer stronger"));
   cav_strategy strategy[CAV_STRATEGIES];
   int n;
   CHECK(cav_strategy_list(&p, strategy, &n) == CAV_OK && !strategy[0].stated);
@@ -389,9 +392,9 @@ static void test_solids(void) {
   CHECK(taken.nswing == 4 && taken.swing[0].amplitude * taken.swing[0].amplitude > 0.1);
   p.guess_rotation[2] = 0.1;
   CHECK(offers(&p,
-               "stated near-1 near-2 near-3 near-4 step near-5 near-6 solids near-7 near-8 repair-1 repair-2 repair-3 "
-               "repair-4 soft line hold slow momentum "
-               "near-9 near-10 near-11 near-12 open longer stronger"));
+               "stated near-1 near-2 near-3 near-4 step near-5 near-6 solids near-7 near-8 fine near-9 near-10 "
+               "repair-1 repair-2 repair-3 repair-4 soft line hold slow momentum near-11 near-12 near-13 "
+               "near-14 open longer stronger"));
   CHECK(cav_strategy_list(&p, strategy, &n) == CAV_OK && strategy[0].schedule.solids == CAV_SOLIDS_HARD);
   cav_strategy_apply(&p, find(strategy, n, "step"), &taken);
   CHECK(taken.nswing == 4 && taken.schedule.solids == CAV_SOLIDS_GROW);
@@ -404,9 +407,8 @@ static void test_solids(void) {
   // where it stops before the wall nothing is in the way
   goal[0] -= 0.8;
   CHECK(offers(&p,
-               "stated near-1 near-2 near-3 near-4 soft hold slow momentum near-5 near-6 near-7 near-8 repair-1 "
-               "repair-2 repair-3 "
-               "repair-4 open longer stronger"));
+               "stated near-1 near-2 near-3 near-4 fine near-5 near-6 soft hold slow momentum near-7 near-8 "
+               "near-9 near-10 repair-1 repair-2 repair-3 repair-4 open longer stronger"));
   cav_model_free(m);
 }
 

@@ -391,7 +391,7 @@ sed 's/pos="1"/pos="3"/; s/duration="1"/duration="3"/; s/<cost>/<constraint><pos
 run 1 solve rise.xml --model lazy.xml -o alone --strategies 1
 check "no other strategy" [ "$(wc -l <alone/strategies.csv)" -eq 2 ]
 run 0 solve rise.xml --model lazy.xml -o risen --threads 1
-says err "trying by other strategies: pump sample soft hold slow resample"
+says err "trying by other strategies: pump sample fine soft hold slow resample"
 says err "kept: strategy pump"
 says out "certified: swing"
 for line in "stated,0,not certified" "pump,1,certified" "hold,0,not tried"; do says risen/strategies.csv "$line"; done

@@ -181,6 +181,17 @@ done
 says dry.force "9.2 N"
 says dry.force "20.0 N"
 
+# what no motor moves comes to rest by its dry friction: a wagon on a track that a cart shunts, at rest at the end
+cat >shunt.xml <<'E2'
+<mujoco><worldbody><body name="cart"><joint name="rail" type="slide" axis="1 0 0"/><geom type="box" size=".2 .1 .1" mass="2"/></body>
+<body name="wagon" pos=".5 0 0"><joint name="track" type="slide" axis="1 0 0" frictionloss="4"/><geom type="box" size=".2 .1 .1" mass="3"/></body>
+</worldbody><actuator><motor name="push" joint="rail" gear="60" ctrllimited="true" ctrlrange="-1 1"/></actuator></mujoco>
+E2
+echo '<problem name="shunt" model="shunt.xml"><horizon duration="1.5"/><start/><goal><joint name="track" pos="0.4"/></goal>
+<cost><sensor name="there" type="jointpos" joint="track" target="0.4" at="end" weight="900"/></cost></problem>' >shunt.problem
+"$cavort" solve shunt.problem -o shunt --threads 1 --strategies 1 >shunt.out 2>err
+ends $? 0 "a wagon that dry friction stops"
+
 # a body that nothing reaches: what leads there, in place of more weight
 cat >far.xml.model <<'E2'
 <mujoco><worldbody><body name="cart"><joint name="rail" type="slide" axis="1 0 0"/><geom type="box" size=".2 .1 .1" mass="2"/></body>

@@ -227,8 +227,9 @@ typedef struct cav_solution {
   double
       optimality; ///< the solver's own: decrease of the cost along the constraints that its last model predicts, over
                   ///< the cost; NaN where the constraints do not hold. A verdict's is the verifier's
-  double unactuated;                                                  ///< largest, fraction of weight
-  int iterations;                                                     ///< of all phases
+  double unactuated; ///< largest, fraction of weight, of what moves light things of their own (optim/METHOD.md)
+  int holds;         ///< 1: forces, limits and constraints hold as a certificate asks
+  int iterations;    ///< of all phases
   double seconds, seconds_dynamics, seconds_assembly, seconds_linear; ///< wall clock
   int nprogress;                                                      ///< lines of the log
   cav_progress *progress;                                             ///< log

@@ -262,6 +262,7 @@ cav_status cav_continuation_run(cav_solve_run *run) {
 /// that.
 typedef struct violation {
   double unactuated, effort, range, term;
+  double weighed; ///< unactuated, of light bodies too as a fraction of the whole weight: what a certificate tells
 } violation;
 
 static violation measure(const cav_transcription *tr) {
@@ -275,6 +276,7 @@ static violation measure(const cav_transcription *tr) {
                       : i < knot->layout.term  ? &m.range
                                                : &m.term;
       *worst = fmax(*worst, e);
+      if (i < knot->layout.effort) m.weighed = fmax(m.weighed, e * tr->fraction[i - knot->layout.unactuated]);
     }
   }
   return m;
@@ -283,7 +285,7 @@ static violation measure(const cav_transcription *tr) {
 static violation allowed(const cav_solve_run *run) {
   double tolerance = run->options->tolerance;
   return (violation){tolerance, fmax(0.5 * (1 - run->problem->effort_limit), tolerance),
-                     fmax(0.5 * run->problem->limit_margin, tolerance), tolerance};
+                     fmax(0.5 * run->problem->limit_margin, tolerance), tolerance, tolerance};
 }
 
 static int holds(const violation *m, const violation *most) {
@@ -302,6 +304,7 @@ void cav_run_allowed(const cav_solve_run *run, double allowance[CAV_BINDING_KIND
 
 int cav_run_certifiable(const cav_solve_run *run) {
   violation most = allowed(run), is = measure(run->tr);
+  is.unactuated = is.weighed;
   most.unactuated = fmax(most.unactuated, CAV_TOLERANCE_UNACTUATED);
   most.term = fmax(most.term, CAV_TOLERANCE_CONSTRAINT);
   // a limit may be passed by its headroom, and a little
@@ -317,6 +320,12 @@ int cav_run_within_limits(const cav_solve_run *run) {
 
 int cav_run_met(const cav_solve_run *run) {
   violation most = allowed(run), is = measure(run->tr);
+  return holds(&is, &most);
+}
+
+int cav_run_weighed_met(const cav_solve_run *run) {
+  violation most = allowed(run), is = measure(run->tr);
+  is.unactuated = is.weighed;
   return holds(&is, &most);
 }
 
@@ -413,7 +422,7 @@ static cav_status rest_from_here(cav_solve_run *run, double radius) {
 
 /// Whether every row nearly holds.
 static int is_near(const cav_solve_run *run) {
-  violation is = measure(run->tr), most = {near, near, near, near};
+  violation is = measure(run->tr), most = {near, near, near, near, near};
   return holds(&is, &most);
 }
 

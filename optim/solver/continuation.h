@@ -149,8 +149,10 @@ cav_status cav_minimise_infeasibility(cav_solve_run *run);
 /// Violation that planning leaves room for, by kind of row: what is planned with headroom may use half of it.
 void cav_run_allowed(const cav_solve_run *run, double allowed[CAV_BINDING_KINDS]);
 
-/// Whether every row holds to that at the last values; whether limits hold without that headroom, too, as certificates ask.
+/// Whether every row holds to that at the last values; the same with forces on light bodies as fractions of the whole weight;
+/// whether limits hold without that headroom, too, as certificates ask.
 int cav_run_met(const cav_solve_run *run);
+int cav_run_weighed_met(const cav_solve_run *run);
 int cav_run_exact(const cav_solve_run *run);
 
 /// Appends a line to the log and tells the observer; nonzero if it asks to stop. Region's report.

@@ -165,7 +165,7 @@ static cav_status find_gains(cav_solve_run *run, int interrupted, cav_error *err
   run->phase = "feedback";
   run->stage = run->stages = 1;
   // a motion whose rows do not quite hold, or that is refused whatever they do, is not worth more than one set
-  int sets = interrupted ? LAST_SETS : cav_run_met(run) && excess <= 1 ? 0 : 1;
+  int sets = interrupted ? LAST_SETS : cav_run_weighed_met(run) && excess <= 1 ? 0 : 1;
   return cav_choose_gains(run->problem, run->tr, run->at, sets, cav_run_feedback, run, run->solution, NULL, error);
 }
 
@@ -179,6 +179,7 @@ static cav_status conclude(cav_solve_run *run, int interrupted, cav_error *error
   run->solution->optimality = run->measured ? run->optimality : NAN;
   run->solution->cost = cav_transcription_cost(run->tr);
   run->solution->unactuated = cav_transcription_unactuated(run->tr, NULL);
+  run->solution->holds = cav_run_certifiable(run) && cav_run_within_limits(run);
   run->solution->contact = run->tr->options;
   status = find_rows(run);
   if (status != CAV_OK) return status;
@@ -195,7 +196,9 @@ cav_status cav_run_solve(cav_solve_run *run, cav_error *error) {
   if (status != CAV_OK) return status;
   status = place < CAV_PLACE_DIAGNOSIS ? cav_solver_run(run, error) : CAV_NOT_CONVERGED;
   if (place <= CAV_PLACE_DIAGNOSIS) {
-    if (status != CAV_NOT_CONVERGED || !o->diagnose || (place < CAV_PLACE_DIAGNOSIS && cav_run_met(run))) return status;
+    // of rows that hold as a certificate asks nothing contradicts anything
+    const int hold = place < CAV_PLACE_DIAGNOSIS && (cav_run_met(run) || cav_run_weighed_met(run));
+    if (status != CAV_NOT_CONVERGED || !o->diagnose || hold) return status;
     if (!cav_run_reaches(run, CAV_PLACE_DIAGNOSIS, &status)) return status;
     cav_status rest = cav_minimise_infeasibility(run);
     if (rest != CAV_OK) return rest;

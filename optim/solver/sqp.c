@@ -117,6 +117,7 @@ typedef struct descent {
   int needs_known;
   double gain;                   ///< decrease of the step that was taken
   double asked;                  ///< what may be left to be saved, of the cost
+  double at_least;               ///< what the last look found at least, finished or not
   double near;                   ///< what is next to nothing; 0 on the way, where a law is left soon in any case
   int screens;                   ///< 1: it is still to be asked whether a certificate would refuse the motion
   int patient;                   ///< 1: being stuck is no end, unless little is left
@@ -563,6 +564,7 @@ static cav_status foresee(cav_solve_run *run, descent *d, double *saving) {
   status = cav_programme_solve(run, d->qp, d->next, d->kept, &d->rest, &solved);
   memcpy(cav_quadratic_penalty(d->qp), d->offset, bytes);
   *saving = INFINITY;
+  d->at_least = solved ? fmax(cav_quadratic_decrease(d->qp), 0) / cav_programme_scale(run->tr) : 0;
   if (solved && fabs(cav_quadratic_unfinished(d->qp)) <= unfinished)
     *saving = (fmax(cav_quadratic_decrease(d->qp), 0) + cav_quadratic_gap(d->qp)) / cav_programme_scale(run->tr);
   return status;
@@ -601,7 +603,7 @@ static cav_status look(cav_solve_run *run, descent *d, tail *end) {
   if (!due) return status;
   end->iterations = 0, end->gain = 0;
   end->met = end->saving <= d->asked && gain < brisk * end->saving ? end->met + 1 : 0;
-  end->stuck = isfinite(end->saving) && gain < sluggish * end->saving ? end->stuck + 1 : 0;
+  end->stuck = gain < d->asked && gain < sluggish * d->at_least ? end->stuck + 1 : 0;
   return status;
 }
 

@@ -40,6 +40,9 @@ enum {
   MEND_LAST = 4
 };
 
+/// s: shorter steps are not halved by a strategy of its own.
+static const double coarse = 0.015;
+
 /// Dofs up to which sampling takes less time than another solve.
 enum { TINY = 5 };
 
@@ -133,6 +136,17 @@ static void begin_with(cav_strategy *strategy, const cav_strategy *first) {
   strategy[0].name = name;
 }
 
+/// As the first one, at half the step: where limbs are fast, or what is leant on is small, the stated one is too long for their
+/// forces.
+static void add_fine(const cav_problem *problem, cav_strategy *strategy, int *n) {
+  if (problem->timestep < coarse || problem->duration_most > 0) return;
+  cav_strategy fine = strategy[0];
+  fine.timestep = problem->timestep / 2;
+  snprintf(fine.changed, sizeof fine.changed, "timestep=\"%g\"", fine.timestep);
+  add(strategy, n, &fine, "fine", "as the first one, at half the step");
+  add_near(strategy, n, &strategy[0], MEND);
+}
+
 /// Where the guess runs into solids: by a flight where an arc is stated; over them, then as it is, then by a flight of its
 /// own; what they miss is mended before anything else is tried. A file without a guess is begun over them: the straight
 /// way through a solid is nobody's.
@@ -149,6 +163,7 @@ static void add_grown(const cav_problem *problem, cav_strategy *strategy, int *n
   solids.text = "lifted out of the solids that the guess runs into, which grow from soft to hard";
   add_mended(strategy, n, &solids, "solids");
   if (fly->height > 0 && problem->guess_height <= 0) add_mended(strategy, n, fly, "flight");
+  add_fine(problem, strategy, n);
   add_repairs(strategy, n, grown);
 }
 
@@ -234,14 +249,14 @@ static cav_status add_posture(const cav_problem *problem, cav_strategy *strategy
   return CAV_OK;
 }
 
-/// What has terms of its own begins with the guess that the first one begins with after all.
-static void begin_upright(cav_strategy *strategy, int n) {
+/// What has terms or a step of its own begins with the guess that the first one begins with after all.
+static void begin_changed(cav_strategy *strategy, int n) {
   for (int i = 1; i < n; i++) {
-    if (!strategy[i].term) continue;
+    if (!*strategy[i].changed) continue;
     const cav_strategy kept = strategy[i];
     strategy[i] = strategy[0];
     strategy[i].name = kept.name, strategy[i].text = kept.text, strategy[i].term = kept.term,
-    strategy[i].nterm = kept.nterm;
+    strategy[i].nterm = kept.nterm, strategy[i].timestep = kept.timestep;
     memcpy(strategy[i].changed, kept.changed, sizeof kept.changed);
   }
 }
@@ -384,6 +399,7 @@ static cav_status add_others(const cav_problem *problem, cav_strategy *strategy,
   if (round) begin_with(strategy, &g->bypass);
   if (g->pivots) begin_with(strategy, &g->walk);
   if (g->walk.nswing && !g->collides && !g->pivots) add_mended(strategy, n, &g->walk, "swing");
+  if (!g->collides) add_fine(problem, strategy, n);
   cav_strategy soft = g->stated;
   soft.schedule.first.smoothing *= SOFTER;
   soft.schedule.first.penalty /= CHEAPER;
@@ -452,7 +468,7 @@ cav_status cav_strategy_list(const cav_problem *problem, cav_strategy strategy[C
   if (status == CAV_OK) status = add_others(problem, strategy, n, &g);
   if (status != CAV_OK) return status;
   for (int number = tiny ? 2 : 1; number <= 2; number++) add_sampled(problem, strategy, n, number);
-  begin_upright(strategy, *n);
+  begin_changed(strategy, *n);
   add_last(problem, strategy, n, &g);
   // what a swing-up takes is told by cav_problem_pumping
   add_diagnoses(problem, strategy, n, &g.stated, swings_up);
@@ -570,9 +586,7 @@ static const double far_off = 5e-3;
 
 /// Whether a motion that a solve did not bring to its tolerance has what a certificate asks of rows, and gains: those of what
 /// comes to rest come in slowly.
-static int is_settled(const cav_solution *solution) {
-  return solution->unactuated <= CAV_TOLERANCE_UNACTUATED && solution->gain_q;
-}
+static int is_settled(const cav_solution *solution) { return solution->holds && solution->gain_q; }
 
 /// By a hand first, that touches what it pushes or leans on it, and from there to the end of a solve; where rows do not come
 /// in, by the last stage before it. The first way whose rows do. A checkpoint of it is not gone on from: it begins anew, and

@@ -200,6 +200,7 @@ static cav_status keep(windows *w, const cav_solution *part, int kept, int end) 
   memcpy(w->at->u + (size_t)w->first * nv, from->u, n * nv * sizeof(double));
   s->contact = part->contact;
   s->unactuated = fmax(s->unactuated, part->unactuated);
+  s->holds = part->holds && (w->first == 0 || s->holds);
   s->seconds_dynamics += part->seconds_dynamics;
   s->seconds_assembly += part->seconds_assembly;
   s->seconds_linear += part->seconds_linear;

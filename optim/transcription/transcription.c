@@ -112,14 +112,15 @@ static int list_force_rows(cav_transcription *tr) {
   double *residual = malloc((size_t)nv * sizeof(double)), *control = calloc((size_t)nv * (nu + 1), sizeof(double));
   double *effort = malloc((size_t)nv * sizeof(double));
   tr->unactuated = calloc((size_t)nv, sizeof *tr->unactuated);
+  tr->fraction = calloc((size_t)nv + 1, sizeof *tr->fraction);
   tr->penalised = calloc((size_t)nv + 1, sizeof *tr->penalised);
   tr->effort = calloc(2 * (size_t)nu + 1, sizeof *tr->effort);
   tr->limited = malloc((size_t)(2 * nu + 1) * sizeof *tr->limited);
   tr->effort_range = malloc((size_t)(2 * nu + 1) * sizeof *tr->effort_range);
   tr->effort_unit = malloc((size_t)(2 * nu + 1) * sizeof *tr->effort_unit);
   tr->servo = calloc(2 * (size_t)nu + 1, sizeof *tr->servo);
-  if (!unit || !basis || !residual || !control || !effort || !tr->unactuated || !tr->penalised || !tr->effort ||
-      !tr->effort_range || !tr->effort_unit || !tr->servo || !tr->limited)
+  if (!unit || !basis || !residual || !control || !effort || !tr->unactuated || !tr->fraction || !tr->penalised ||
+      !tr->effort || !tr->effort_range || !tr->effort_unit || !tr->servo || !tr->limited)
     goto end;
 
   // project unit forces; orthonormalise what is left, twice for rounding
@@ -146,6 +147,7 @@ static int list_force_rows(cav_transcription *tr) {
       if (!force_row_set(&tr->penalised[tr->npenalised++], nv, direction, 1 / deviation)) goto end;
       continue;
     }
+    tr->fraction[tr->nresidual] = cav_force_fraction(m, d);
     if (!force_row_set(&tr->unactuated[tr->nresidual++], nv, direction, 1 / unit_force)) goto end;
   }
 
@@ -364,8 +366,8 @@ void cav_transcription_free(cav_transcription *tr) {
   for (int a = 0; tr->servo && a < tr->nlimit; a++) cav_servo_free(&tr->servo[a]);
   cav_edges_free(tr->edges);
   free(tr->servo), free(tr->limited);
-  free(tr->unactuated), free(tr->penalised), free(tr->effort), free(tr->effort_range), free(tr->effort_unit),
-      free(tr->rotation_dof), free(tr->rotation_of);
+  free(tr->unactuated), free(tr->fraction), free(tr->penalised), free(tr->effort), free(tr->effort_range),
+      free(tr->effort_unit), free(tr->rotation_dof), free(tr->rotation_of);
   free(tr->knot), free(tr->status), free(tr->ready), free(tr->order), free(tr->scratch), free(tr->before),
       free(tr->start), free(tr->rotation_after), free(tr->window), free(tr->selected);
   cav_periodicity_free(tr->periodicity);

@@ -141,6 +141,7 @@ typedef struct cav_transcription {
   double smoothness;         ///< curvature of squared accelerations, s^4/m^2, where no running cost has any; 0: one has
   int nresidual;             ///< rows of unactuated
   cav_force_row *unactuated; ///< orthonormal complement of the actuators' range, scaled to fractions of weight
+  double *fraction;          ///< [nv] of each of these rows: its unit, as a fraction of the certificate's
   int npenalised;            ///< dofs of roots whose unactuated forces are a cost
   cav_force_row *penalised;  ///< [npenalised] over their deviations
   int nlimit;                ///< rows of effort: one an actuator; then of control, of servos limited in both

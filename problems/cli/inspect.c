@@ -99,37 +99,89 @@ static void print_bodies(const cav_model *m) {
   printf("\n");
 }
 
-// Type and range of every joint, where it is at the posture of the file or the start of a problem, and what a positive change
-// of it moves there
+// what actuators can give along a dof where the state is, N or N m; nothing where none moves it
+static void write_effort(const cav_model *m, cav_state *state, int dof, const char *unit, double *moment,
+                         char text[60]) {
+  double most[2] = {0, 0};
+  *text = 0;
+  for (int i = 0; i < m->nu; i++) {
+    double range[2];
+    cav_actuator_length(m, state, i, moment);
+    if (moment[dof] == 0) continue;
+    cav_actuator_effort_range(m, i, range);
+    most[0] += fmin(moment[dof] * range[0], moment[dof] * range[1]);
+    most[1] += fmax(moment[dof] * range[0], moment[dof] * range[1]);
+  }
+  if (isinf(most[0]) || isinf(most[1]))
+    sprintf(text, "no limit");
+  else if (most[0] != 0 || most[1] != 0)
+    sprintf(text, "%.3g..%.3g %s", most[0], most[1], unit);
+}
+
+// Type and range of every joint, what actuators give along it, where it is at the posture of the file or the start of a problem,
+// and what a positive change of it moves there
 static cav_status print_joints(const cav_model *m, const cav_problem *p, cav_error *error) {
   cav_state *state = cav_state_new(m);
   const double *q = p ? p->q_start : m->q0;
   cav_roles roles;
   cav_status status = state ? cav_roles_find(m, state, &roles) : CAV_NO_MEMORY;
   if (!status) status = cav_position(m, state, q);
+  double *moment = calloc((size_t)m->nv + 1, sizeof *moment);
+  if (!status && !moment) status = CAV_NO_MEMORY;
   if (status) cav_file_fail(error, status, 0, "the joints cannot be evaluated");
   int width = 20;
   for (int j = 0; j < m->njoint; j++) width = (int)fmax(width, fmin((double)strlen(m->joint[j].name), 40));
   if (!status && m->njoint)
-    printf("%-*s %-6s %-18s %-10s + moves, seen from the root of its tree\n", width, "joint", "type", "range",
-           p ? "start" : "in file");
+    printf("%-*s %-6s %-18s %-17s %-10s + moves, seen from the root of its tree\n", width, "joint", "type", "range",
+           "actuators give", p ? "start" : "in file");
   for (int j = 0; j < m->njoint && !status; j++) {
     const cav_joint *joint = &m->joint[j];
     const int slides = joint->type == CAV_JOINT_SLIDE, scalar = slides || joint->type == CAV_JOINT_HINGE;
-    char range[120], at[40] = "", sense[CAV_SENSE];
+    char range[120], effort[60] = "", at[40] = "", sense[CAV_SENSE];
     write_range(joint, range);
+    if (scalar) write_effort(m, state, joint->dof, slides ? "N" : "N m", moment, effort);
     cav_sense_of(m, state, &roles, j, sense);
     if (scalar) snprintf(at, sizeof at, "%.4g %s", (slides ? 1 : 180 / M_PI) * q[joint->q] + 0.0, slides ? "m" : "deg");
     printf("%-*s %s", width, joint->name[0] ? joint->name : "(no name)", joint_name[joint->type]);
     if (scalar)
-      printf("  %-18s %-10s + %s", range, at, sense);
+      printf("  %-18s %-17s %-10s + %s", range, *effort ? effort : "-", at, sense);
     else if (*range)
       printf(" %s", range);
     printf("\n");
   }
   if (m->njoint) printf("\n");
+  free(moment);
   cav_state_free(state);
   return status;
+}
+
+// geoms that something may touch: on which body, of what kind and size
+static void print_geoms(const cav_model *m) {
+  int n = 0, width = 20;
+  for (int g = 0; g < m->ngeom; g++) width = (int)fmax(width, fmin((double)strlen(m->geom[g].name), 40));
+  for (int g = 0; g < m->ngeom; g++) {
+    const cav_geom *geom = &m->geom[g];
+    int touches = 0;
+    for (int p = 0; p < m->npair; p++) touches |= m->pair[p].geom1 == g || m->pair[p].geom2 == g;
+    if (!touches) continue;
+    if (!n++)
+      printf("%-*s %-20s %-12s size as in MJCF, of a mesh half its box, m\n", width, "geom that can touch", "of",
+             "type");
+    const char *body = geom->body > 0 ? m->body[geom->body].name : "world";
+    printf("%-*s %-20s %-13s", width, *geom->name ? geom->name : "(no name)", *body ? body : "(no name)",
+           geom_name[geom->type]);
+    for (int k = 0; k < 3 && geom->size[k] != 0 && geom->type != CAV_GEOM_PLANE; k++) printf("%.4g ", geom->size[k]);
+    printf("\n");
+  }
+  if (!n) printf("no geom can touch another\n");
+  printf("\n");
+}
+
+static void print_keyframes(const cav_model *m) {
+  if (!m->nkey) return;
+  printf("keyframes:");
+  for (int i = 0; i < m->nkey; i++) printf("%s %s", i ? "," : "", *m->key[i].name ? m->key[i].name : "(no name)");
+  printf("\n\n");
 }
 
 // what key="stand" is
@@ -647,6 +699,8 @@ static cav_status print_model(const cav_model *m, const cav_problem *p, int all,
     cav_status status = print_joints(m, p, error);
     if (!status) status = print_places(m, p, error);
     if (status) return status;
+    print_geoms(m);
+    print_keyframes(m);
     print_roles(m);
   }
   if (all) {
