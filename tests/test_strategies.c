@@ -403,6 +403,13 @@ static void test_solids(void) {
   p.guess_height = 0.1, p.guess_from = 0.5, p.guess_to = 0.9;
   CHECK(cav_strategy_list(&p, strategy, &n) == CAV_OK && !strcmp(strategy[5].name, "flight"));
   check_flight(&p, &strategy[5], 0.3, 0.7);
+  // a file that states the flight that would be found has no other
+  cav_strategy_apply(&p, &strategy[5], &taken);
+  cav_strategy others[CAV_STRATEGIES];
+  int rest;
+  CHECK(cav_strategy_list(&taken, others, &rest) == CAV_OK && !find(others, rest, "flight") &&
+        find(others, rest, "fine"));
+  cav_strategies_clear(others, rest);
   p.guess_height = 0;
   // where it stops before the wall nothing is in the way
   goal[0] -= 0.8;

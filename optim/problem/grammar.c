@@ -129,7 +129,7 @@ static const cav_xml_element pose = {
 #define WITHIN_edge_force
 #define WITHIN_self_force
 #define DOFS                                                                                                           \
-  WORD("dofs", cav_problem_dof_sets, "joints", "dofs that count: joints are all but free joints"),                     \
+  WORD("dofs", cav_problem_dof_sets, "joints", "dofs that count: joints are all but free joints, of things of the scene, too"),                     \
   TEXT("joint", "(dofs)", "one joint in the place of a set of dofs")
 #define RATE_ATTRIBUTES                                                                                                \
   DOFS, TABLE, REALS("target", 1, 0, "of the term", "(0)", "wanted rate: one number, or one for each selected dof")

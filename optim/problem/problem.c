@@ -350,18 +350,27 @@ static const char *meant(const cav_joint *joint, double value, int degrees) {
 static cav_status refuse_range(const cav_problem_reader *reader, const cav_xml_node *node, int j, double value,
                                double least) {
   const cav_joint *joint = &reader->model->joint[j];
-  const int slide = joint->type == CAV_JOINT_SLIDE, degrees = !slide && cav_problem_in_degrees(reader, node, j);
-  const double unit = degrees ? 180 / M_PI : 1;
   const int based = cav_xml_get(node, "key") || cav_xml_get(node, "qpos") || cav_xml_get(node, "file");
-  if (!based && value == reader->model->q0[joint->q])
-    return cav_xml_fail(
-        reader->error, node, NULL,
-        "joint '%s' is at %g, outside its range %.5g .. %.5g %s, in the model's own configuration, with "
-        "which a posture without 'key' begins; key=\"stand\", or a keyframe of the model, begins with another",
-        joint->name, unit * value, unit * least, unit * joint->range[1],
-        slide     ? "m"
-        : degrees ? "degrees"
-                  : "rad");
+  const int own = !based && value == reader->model->q0[joint->q], hinge = joint->type == CAV_JOINT_HINGE;
+  // of the model's own posture nobody said in what
+  const int slide = joint->type == CAV_JOINT_SLIDE,
+            degrees = (own && hinge) || (!slide && cav_problem_in_degrees(reader, node, j));
+  const double unit = degrees ? 180 / M_PI : 1;
+  if (own)
+    return cav_xml_fail(reader->error, node, NULL,
+                        "joint '%s' is at %g, outside its range %.5g .. %.5g %s, in the model's own configuration, "
+                        "with which a posture "
+                        "without 'key' begins; key=\"stand\", or a keyframe of the model, begins with another, <joint "
+                        "name=\"%s\"%s/> inside "
+                        "sets it, ranges=\"clip\" brings it in",
+                        joint->name, unit * value, unit * least, unit * joint->range[1],
+                        slide     ? "m"
+                        : degrees ? "degrees"
+                                  : "rad",
+                        joint->name,
+                        slide   ? " pos="
+                        : hinge ? " degrees="
+                                : "");
   return cav_xml_fail(reader->error, node, NULL,
                       "joint '%s' is at %g, outside its range %.5g .. %.5g %s; ranges='clip' would bring it in%s",
                       joint->name, unit * value, unit * least, unit * joint->range[1],

@@ -41,7 +41,7 @@ enum { FEW = 3 };
 /// gains where progress is not slow, and where it is so slow that a run is stuck: that is its end too, where what is left
 /// is no more than so many times what is asked for.
 enum { LOOK = 5, LOOKS = 2 };
-static const double brisk = 0.5, sluggish = 0.03, left_alone = 1.25;
+static const double brisk = 0.5, sluggish = 0.03, doubtful = 0.01, left_alone = 1.25;
 
 /// Part of what may be left to be saved: one look that finds no more ends a run whose iterations gain less than that each,
 /// however fast it converges.
@@ -603,7 +603,9 @@ static cav_status look(cav_solve_run *run, descent *d, tail *end) {
   if (!due) return status;
   end->iterations = 0, end->gain = 0;
   end->met = end->saving <= d->asked && gain < brisk * end->saving ? end->met + 1 : 0;
-  end->stuck = gain < d->asked && gain < sluggish * d->at_least ? end->stuck + 1 : 0;
+  // what is not finished tells less
+  const double little = isfinite(end->saving) ? sluggish : doubtful;
+  end->stuck = gain < d->asked && gain < little * d->at_least ? end->stuck + 1 : 0;
   return status;
 }
 

@@ -123,6 +123,20 @@ static cav_status flight(const cav_problem *problem, cav_strategy *strategy) {
   return status;
 }
 
+/// Whether a strategy's guess is the problem's own, as where a file states the flight that would be found for it.
+static cav_status is_own_guess(const cav_problem *problem, const cav_strategy *strategy, int *same) {
+  static const double little = 1e-3; // m or rad
+  cav_problem taken;
+  cav_error error = {0};
+  cav_strategy_apply(problem, strategy, &taken);
+  cav_trajectory *own = cav_problem_guess(problem, &error), *other = own ? cav_problem_guess(&taken, &error) : NULL;
+  *same = own && other && own->nknot == other->nknot;
+  for (int i = 0; *same && i < own->nknot * own->nq; i++) *same = fabs(own->q[i] - other->q[i]) <= little;
+  cav_trajectory_free(own);
+  cav_trajectory_free(other);
+  return error.status == CAV_NO_MEMORY ? CAV_NO_MEMORY : CAV_OK;
+}
+
 /// A strategy, and what mends it where that is nearly there.
 static void add_mended(cav_strategy *strategy, int *n, const cav_strategy *from, const char *name) {
   add(strategy, n, from, name, from->text);
@@ -373,7 +387,12 @@ static cav_status find_guesses(const cav_problem *problem, const cav_strategy *s
   if (status == CAV_OK && reaches) status = cav_reach_find(problem, &g->reach);
   g->fly.text = "all of the way by an arc clear of solids, start and goal held before and after it";
   g->fly.schedule.solids = problem->schedule.solids;
-  return status == CAV_OK ? flight(problem, &g->fly) : status;
+  if (status == CAV_OK) status = flight(problem, &g->fly);
+  int stated_so = 0;
+  if (status == CAV_OK && g->fly.height > 0 && problem->guess_height > 0)
+    status = is_own_guess(problem, &g->fly, &stated_so);
+  if (stated_so) g->fly.height = 0;
+  return status;
 }
 
 /// From the straight way and from the start held, where the stated guess is neither.

@@ -21,11 +21,17 @@ static const char *const geom_name[] = {"plane",    "sphere", "capsule", "ellips
 static const char *const joint_name[] = {"free", "ball", "slide", "hinge"};
 
 static void print_sizes(const cav_model *m) {
-  int tree = 0;
-  for (int i = 1; i < m->nlink; i++) tree += m->link[i].parent == 0;
+  int tree = 0, things = 0, driven = 0;
+  double mass = 0;
+  for (int i = 1; i < m->nlink; i++) {
+    tree += m->link[i].parent == 0;
+    *(m->link[i].driven ? &driven : &things) = 1;
+    mass += m->link[i].driven ? m->link[i].mass : 0;
+  }
   printf("model %s\n", m->name[0] ? m->name : "without a name");
-  printf("  positions %d, velocities %d, controls %d, mass %.4g kg, step %g s, gravity %g %g %g m/s^2\n", m->nq, m->nv,
-         m->nu, m->mass, m->timestep, m->gravity[0], m->gravity[1], m->gravity[2]);
+  printf("  positions %d, velocities %d, controls %d, mass %.4g kg", m->nq, m->nv, m->nu, m->mass);
+  if (things && driven) printf(", %.4g of it what actuators move", mass);
+  printf(", step %g s, gravity %g %g %g m/s^2\n", m->timestep, m->gravity[0], m->gravity[1], m->gravity[2]);
   printf("  %d bodies in %d moving links in %d tree%s, %d geoms, %d sites, %d sensors, %d keyframes, %.1f kB\n",
          m->nbody - 1, m->nlink - 1, tree, tree == 1 ? "" : "s", m->ngeom, m->nsite, m->nsensor, m->nkey,
          (double)m->bytes / 1024);

@@ -245,7 +245,7 @@ static int tell_fall(FILE *out, const cav_problem *p) {
   if (low) memcpy(q, p->q_start, (size_t)m->nq * sizeof *q);
   const int lowered = low && !cav_configuration_to_floor(m, low, NULL, q, NULL);
   for (int i = 1; low && i < m->nlink; i++) {
-    if (!cav_command_is_loose(m, i) || touches(m, state, i)) continue;
+    if (!cav_command_floats(m, i) || touches(m, state, i)) continue;
     const int z = m->joint[m->link[i].joint].q + 2;
     const double height = lowered ? p->q_start[z] - q[z] : 0;
     const char *name = m->body[m->link[i].body].name;

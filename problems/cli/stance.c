@@ -33,15 +33,20 @@ static int body_of(const cav_model *m, const cav_contact *c) {
   return m->geom[m->geom[pair->geom1].link == 0 ? pair->geom2 : pair->geom1].body;
 }
 
-// ", touches the world with a, b in x 0..1, y 0..1"
+// ", touches the world with a, b in x 0..1, y 0..1"; where is that of what actuators move, things of the scene aside
 static void print_touch(const cav_model *m, const cav_state *state) {
   double low[2] = {INFINITY, INFINITY}, high[2] = {-INFINITY, -INFINITY};
-  int bodies = 0;
+  int bodies = 0, driven = 0, things = 0;
+  for (int i = 0; i < state->ncontact; i++) {
+    const int body = body_of(m, &state->contact[i]);
+    driven |= body && m->link[m->body[body].link].driven;
+    things |= body && !m->link[m->body[body].link].driven;
+  }
   for (int i = 0; i < state->ncontact; i++) {
     const int body = body_of(m, &state->contact[i]);
     int before = 0;
     if (!body) continue;
-    for (int k = 0; k < 2; k++) {
+    for (int k = 0; k < 2 && m->link[m->body[body].link].driven == driven; k++) {
       low[k] = fmin(low[k], state->contact[i].pos[k]);
       high[k] = fmax(high[k], state->contact[i].pos[k]);
     }
@@ -52,7 +57,8 @@ static void print_touch(const cav_model *m, const cav_state *state) {
   }
   if (bodies > NAMED) printf(" and %d more", bodies - NAMED);
   if (bodies)
-    printf(" in x %.3f..%.3f, y %.3f..%.3f", low[0], high[0], low[1], high[1]);
+    printf("%s in x %.3f..%.3f, y %.3f..%.3f", driven && things ? ", what is driven" : "", low[0], high[0], low[1],
+           high[1]);
   else
     printf(", touches nothing of the world");
 }

@@ -120,6 +120,31 @@ static const struct {
      "constraint:\n"
      "  <constraint><sensor type=\"touch\" body=\"bar\" upper=\"0\"/></constraint>",
      "force"},
+    {"grasp|grip|grab|pinch|gripper|attach|weld|rope|cable|string",
+     "no hand closes on a thing: it is held by friction and force, between two hands or the fingers of a model that "
+     "has "
+     "them.\n  What shall be fixed or hang on a rope for good is an <equality> or a <tendon> of the model's file",
+     NULL},
+    {"hold|held|keep|stay|still|freeze|rest|pause",
+     "a posture, place or angle is held by a term over a while: from=\"1\" to=\"2\" in place of at=; a whole motion "
+     "ends "
+     "at rest\n  unless <horizon close=\"open\"/> says that it need not",
+     "within"},
+    {"mass|weight|heavy|inertia|payload|gear|damping|frictionloss|armature",
+     "mass, gear, damping and friction are of the model's file, or of a body of <scene>, as MJCF writes them; weight= "
+     "of a "
+     "term is\n  what missing it costs. cavort inspect MODEL says what bodies weigh and what actuators give",
+     "terms"},
+    {"cup|can|bottle|tool|block|crate|carton|payloads|load",
+     "a thing is a <body> with a <freejoint> in <scene>: help move", NULL},
+    {"end|final|last|finish",
+     "at=\"end\" of a term; <horizon duration=\"2\"/> says when that is, and close=\"open\" that nothing need rest "
+     "then",
+     "horizon"},
+    {"flight|fly|land|landing|airborne",
+     "of a way through the air <guess apex=\"0.3\" from=\"0.8\" to=\"1.3\"/> says how high and when: by gravity "
+     "an apex is\n  1.2 m times the square of the seconds between",
+     "guess"},
     {"door|doors|drawer|lid|lever|hinge|gate|push|pull|carry|lift|throw|move",
      "what no actuator moves stands in <scene> as a <body> with a <freejoint>, or with a <joint type=\"hinge\"> or "
      "slide; "
