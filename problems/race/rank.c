@@ -98,9 +98,6 @@ int cav_rank_near(const cav_race_report *report, double effort) {
          v->limit_violation_max < (1 - effort) / 2;
 }
 
-// times its tolerance of what is all but met, and how much more mending that is worth
-static const double a_little = 1.1, once_more = 2.5;
-
 // what a forward step that has another solution than the planned one counts, however far that is
 static const double folded = 2;
 
@@ -145,22 +142,13 @@ int cav_rank_nearer(const cav_race_report *a, const cav_race_report *b) {
   return excess_of(v) < excess_of(w);
 }
 
-// whether a motion has all that a certificate asks but for a little of momentum, slip or hover, however it is followed
-static int is_all_but_there(const cav_verdict *v) {
-  int which;
-  const double most = over_tolerance(v, &which);
-  return cav_rank_rough(v) && depth_of(v) <= 1 && v->replay_step_max_error <= CAV_TOLERANCE_STEP && most > 1 &&
-         most <= a_little;
-}
-
 int cav_rank_spent(const cav_race *race, int i) {
-  double mended = 0, sought = 0, worth_it = 1;
+  double mended = 0, sought = 0;
   for (int k = 0; k < i; k++) {
     const cav_race_entry *e = &race->entry[k];
     if (e->state != CAV_RACE_DONE || !e->report.solution) continue;
     const double step = e->strategy.timestep > 0 ? e->strategy.timestep : race->problem->timestep;
     *(e->from >= 0 ? &mended : &sought) += e->report.verdict.iterations / step;
-    if (is_all_but_there(&e->report.verdict)) worth_it = once_more;
   }
-  return mended > worth_it * sought;
+  return mended > sought;
 }

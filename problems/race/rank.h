@@ -34,8 +34,7 @@ int cav_rank_nearer(const cav_race_report *a, const cav_race_report *b);
 int cav_rank_helped(const cav_verdict *repaired, const cav_verdict *before);
 
 /// Whether what was mended before entry i took longer than what was solved from guesses, so that the next guess comes first: by
-/// iterations times knots, which are the same on every machine. Where a motion misses a little of momentum, slip or hover alone,
-/// two and a half times as long.
+/// iterations times knots, which are the same on every machine.
 int cav_rank_spent(const cav_race *race, int i);
 
 #endif
