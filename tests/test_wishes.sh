@@ -191,6 +191,19 @@ echo '<problem name="shunt" model="shunt.xml"><horizon duration="1.5"/><start/><
 <cost><sensor name="there" type="jointpos" joint="track" target="0.4" at="end" weight="900"/></cost></problem>' >shunt.problem
 "$cavort" solve shunt.problem -o shunt --threads 1 --strategies 1 >shunt.out 2>err
 ends $? 0 "a wagon that dry friction stops"
+# as far as its stop; and left alone it is not thrown out by the stop that it begins at
+sed 's/frictionloss="4"/& limited="true" range="0 0.4"/' shunt.xml >stop.xml
+sed 's/shunt.xml/stop.xml/' shunt.problem >stop.problem
+"$cavort" solve stop.problem -o stop --threads 1 --strategies 1 >stop.out 2>err
+ends $? 0 "a wagon shunted up to its stop"
+echo '<problem name="idle" model="stop.xml"><horizon duration="1"/><start/><goal><joint name="rail" pos="-.2"/></goal>
+<cost><posture dofs="all" at="end" weight="900"/></cost></problem>' >idle.problem
+"$cavort" solve idle.problem -o idle --threads 1 --strategies 1 >idle.out 2>err
+ends $? 0 "a wagon that stands at its stop"
+awk -F, 'NR == 1 { for (i = 1; i <= NF; i++) if ($i == "qpos_track") c = i } NR > 1 && ($c > 1e-6 || $c < -1e-6) { print "moved", $1, $c }
+  END { print NR - 1, "knots" }' idle/trajectory.csv >idle.moved
+says idle.moved "41 knots"
+ends "$(grep -c moved idle.moved)" 0 "knots at which it has moved by a micrometre"
 
 # a body that nothing reaches: what leads there, in place of more weight
 cat >far.xml.model <<'E2'

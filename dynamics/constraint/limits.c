@@ -18,9 +18,11 @@ static const double SMOOTH_ACTIVATION = 12;
 // fastest approach to a limit met without a jump, rad/s or m/s
 static const double LIMIT_SPEED = 20;
 
-// friction losses of joints that no actuator moves are rounded over so much less of a velocity: as long as they creep, a door
-// or a lever does not come to rest
-static const double HELD_BY_FRICTION = 0.01;
+// friction losses and ranges of joints that no actuator moves are rounded over so much less: as long as they creep, a door or a
+// lever does not come to rest, and a stop throws out what begins at it
+static const double PASSIVE = 0.01;
+// such stops are set back by so many times what is left of the distance, where the tail of their force pushes nothing
+static const double BEHIND = 20;
 // contacts of the smoothed law: fraction of their activation distance over which they fade out at its end, fraction of
 // the radii of round geoms over which they fade out where axes meet, and the least that is left
 static const double FADING = 0.3, CORE = 0.5, STIFFNESS_RATIO_MIN = 1e-12;
@@ -88,20 +90,24 @@ double cav_limit_activation(const cav_state *state, double margin) {
   return margin + cav_law_activation(state, self_smoothing(state), LIMIT_SPEED);
 }
 
-// one more row with its law. Friction loss (bound > 0) has no position error; where the law is smoothed, its corners
-// are rounded over a fraction of the velocity at which a limit of the same softness would be
-static cav_status add_row(cav_state *state, cav_row row, const cav_softness *softness, double weight, double rounded) {
+// one more row with its law; until then its sigma is the part of the smoothing distance that it takes. Friction loss (bound > 0)
+// has no position error; where the law is smoothed, its corners are rounded over the velocity at which a limit of the same
+// softness would be
+static cav_status add_row(cav_state *state, cav_row row, const cav_softness *softness, double weight) {
   int friction = row.type == CAV_ROW_FRICTION_DOF || row.type == CAV_ROW_FRICTION_TENDON;
   cav_law l = row_law(state, softness, friction ? 0 : row.dist - row.margin, weight);
   row.regulariser = l.regulariser;
   row.damping = l.damping + (friction ? cav_friction_stops(state) : 0);
   row.stiffness = friction ? 0 : l.stiffness;
-  row.sigma = rounded * smoothing_scale(&l, self_smoothing(state));
+  row.sigma = smoothing_scale(&l, row.sigma * self_smoothing(state));
   cav_row *slot = cav_row_push(state);
   if (!slot) { return CAV_NO_MEMORY; }
   *slot = row;
   return CAV_OK;
 }
+
+// a motor holds a joint where it stands; where there is none, friction and stops alone do
+static double rounding_of(const cav_joint *joint) { return joint->driven ? 1 : PASSIVE; }
 
 static cav_status add_friction(const cav_model *model, cav_state *state) {
   const cav_workspace *w = state->work;
@@ -111,16 +117,15 @@ static cav_status add_friction(const cav_model *model, cav_state *state) {
     const cav_dof *dof = &model->dof[k];
     cav_row row = {.type = CAV_ROW_FRICTION_DOF, .object = k, .axis = {1}};
     row.bound = state->options.timestep * dof->frictionloss;
-    // a motor holds a joint that stands still; where there is none, friction alone does
-    const double rounded = model->joint[dof->joint].driven ? 1 : HELD_BY_FRICTION;
-    status = add_row(state, row, &dof->friction, dof->inverse_weight, rounded);
+    row.sigma = rounding_of(&model->joint[dof->joint]);
+    status = add_row(state, row, &dof->friction, dof->inverse_weight);
   }
   for (int i = 0; i < w->ntendon_friction && !status; i++) {
     int k = w->tendon_friction[i];
     const cav_tendon *tendon = &model->tendon[k];
-    cav_row row = {.type = CAV_ROW_FRICTION_TENDON, .object = k, .axis = {1}};
+    cav_row row = {.type = CAV_ROW_FRICTION_TENDON, .object = k, .axis = {1}, .sigma = 1};
     row.bound = state->options.timestep * tendon->frictionloss;
-    status = add_row(state, row, &tendon->friction, tendon->inverse_weight, 1);
+    status = add_row(state, row, &tendon->friction, tendon->inverse_weight);
   }
   return status;
 }
@@ -133,7 +138,7 @@ static cav_status limit_scalar(cav_state *state, cav_row row, double value, cons
     row.side = side;
     row.axis[0] = side ? -1 : 1;
     row.dist = side ? range[1] - value : value - range[0];
-    if (row.dist < activation) { status = add_row(state, row, softness, weight, 1); }
+    if (row.dist < activation) { status = add_row(state, row, softness, weight); }
   }
   return status;
 }
@@ -145,7 +150,7 @@ static cav_status limit_turn(cav_state *state, cav_row row, int side, double dis
   row.side = side;
   row.dist = dist;
   rotate_back(row.axis, J, n);
-  return add_row(state, row, &joint->limit, weight, 1);
+  return add_row(state, row, &joint->limit, weight);
 }
 
 // twist range and swing radius of a ball joint
@@ -178,7 +183,7 @@ static cav_status limit_ball(cav_state *state, cav_row row, const cav_joint *joi
   row.side = 1;
   row.dist = joint->range[1] - normalise3(turn);
   scale3(row.axis, -1, turn);
-  return row.dist < activation ? add_row(state, row, &joint->limit, weight, 1) : CAV_OK;
+  return row.dist < activation ? add_row(state, row, &joint->limit, weight) : CAV_OK;
 }
 
 // limit i of the list of those of joints; beyond: how far from its margin it counts
@@ -191,7 +196,8 @@ static cav_status add_joint_limit(const cav_model *model, cav_state *state, int 
   const double *at = w->q + joint->q, *range = joint->range;
   if (joint->type != CAV_JOINT_BALL && !(at[0] - range[0] < activation) && !(range[1] - at[0] < activation))
     return CAV_OK;
-  cav_row row = {.type = CAV_ROW_LIMIT_JOINT, .object = k, .margin = joint->margin};
+  cav_row row = {.type = CAV_ROW_LIMIT_JOINT, .object = k, .margin = joint->margin, .sigma = rounding_of(joint)};
+  if (!joint->driven) row.margin -= BEHIND * PASSIVE * self_smoothing(state);
   if (joint->type != CAV_JOINT_BALL) return limit_scalar(state, row, at[0], range, &joint->limit, weight, activation);
   cav_status status = joint->limited ? limit_ball(state, row, joint, weight, activation) : CAV_OK;
   return status ? status : limit_cylinder(state, row, joint, weight, activation);
@@ -203,7 +209,7 @@ static cav_status add_tendon_limits(const cav_model *model, cav_state *state) {
   for (int i = 0; i < w->ntendon_limit && !status; i++) {
     int k = w->tendon_limit[i];
     const cav_tendon *tendon = &model->tendon[k];
-    cav_row row = {.type = CAV_ROW_LIMIT_TENDON, .object = k, .margin = tendon->margin};
+    cav_row row = {.type = CAV_ROW_LIMIT_TENDON, .object = k, .margin = tendon->margin, .sigma = 1};
     status = limit_scalar(state, row, state->tendon_length[k], tendon->range, &tendon->limit, tendon->inverse_weight,
                           cav_limit_activation(state, tendon->margin));
   }

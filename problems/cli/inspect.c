@@ -90,11 +90,13 @@ static cav_status print_places(const cav_model *m, const cav_problem *p, cav_err
 }
 
 static void print_bodies(const cav_model *m) {
-  printf("%-20s %-20s %8s  %s\n", "body", "on", "kg", "joints");
+  int width = 20;
+  for (int i = 1; i < m->nbody; i++) width = (int)fmax(width, fmin((double)strlen(m->body[i].name), 40));
+  printf("%-*s %-*s %8s  %s\n", width, "body", width, "on", "kg", "joints");
   for (int i = 1; i < m->nbody; i++) {
     const cav_body *body = &m->body[i];
     const cav_link *link = &m->link[body->link];
-    printf("%-20s %-20s %8.4g  ", body->name[0] ? body->name : "(no name)",
+    printf("%-*s %-*s %8.4g  ", width, body->name[0] ? body->name : "(no name)", width,
            body->parent > 0 ? m->body[body->parent].name : "world", body->mass);
     if (body->link == 0) printf("fixed to the world");
     if (body->link > 0 && link->body != i) printf("fixed to %s", m->body[link->body].name);
@@ -163,18 +165,20 @@ static cav_status print_joints(const cav_model *m, const cav_problem *p, cav_err
 
 // geoms that something may touch: on which body, of what kind and size
 static void print_geoms(const cav_model *m) {
-  int n = 0, width = 20;
-  for (int g = 0; g < m->ngeom; g++) width = (int)fmax(width, fmin((double)strlen(m->geom[g].name), 40));
+  int n = 0, width = 20, on = 20;
+  char words[CAV_WORDS];
+  for (int g = 0; g < m->ngeom; g++) width = (int)fmax(width, fmin((double)strlen(cav_geom_words(m, g, words)), 40));
+  for (int b = 0; b < m->nbody; b++) on = (int)fmax(on, fmin((double)strlen(m->body[b].name), 40));
   for (int g = 0; g < m->ngeom; g++) {
     const cav_geom *geom = &m->geom[g];
     int touches = 0;
     for (int p = 0; p < m->npair; p++) touches |= m->pair[p].geom1 == g || m->pair[p].geom2 == g;
     if (!touches) continue;
     if (!n++)
-      printf("%-*s %-20s %-12s size as in MJCF, of a mesh half its box, m\n", width, "geom that can touch", "of",
+      printf("%-*s %-*s %-12s size as in MJCF, of a mesh half its box, m\n", width, "geom that can touch", on, "of",
              "type");
     const char *body = geom->body > 0 ? m->body[geom->body].name : "world";
-    printf("%-*s %-20s %-13s", width, *geom->name ? geom->name : "(no name)", *body ? body : "(no name)",
+    printf("%-*s %-*s %-13s", width, cav_geom_words(m, g, words), on, *body ? body : "(no name)",
            geom_name[geom->type]);
     for (int k = 0; k < 3 && geom->size[k] != 0 && geom->type != CAV_GEOM_PLANE; k++) printf("%.4g ", geom->size[k]);
     printf("\n");

@@ -57,8 +57,8 @@ static void print_touch(const cav_model *m, const cav_state *state) {
   }
   if (bodies > NAMED) printf(" and %d more", bodies - NAMED);
   if (bodies)
-    printf("%s in x %.3f..%.3f, y %.3f..%.3f", driven && things ? ", what is driven" : "", low[0], high[0], low[1],
-           high[1]);
+    printf("%s in x %.3f..%.3f, y %.3f..%.3f", driven && things ? "; that of what actuators move" : "", low[0], high[0],
+           low[1], high[1]);
   else
     printf(", touches nothing of the world");
 }

@@ -46,12 +46,12 @@ void cav_command_tell_diagnoses(FILE *out, const char *folder, const cav_problem
   cav_tried t = cav_tried_open(folder);
   while (cav_tried_next(&t)) {
     double value = 0;
-    int end = 0;
+    int seconds = 0, times = 0; // where the words end, if they are there
     if (t.kept) continue;
     if (!strcmp(t.reason, "an open end would do")) cav_command_tell_would_do(out, "", p, CAV_WOULD_DO_OPEN_END, 0);
-    if (sscanf(t.reason, "%lf s would do%n", &value, &end) == 1 && end)
+    if (sscanf(t.reason, "%lf s would do%n", &value, &seconds) == 1 && seconds)
       cav_command_tell_would_do(out, "", p, CAV_WOULD_DO_DURATION, value);
-    if (sscanf(t.reason, "%lf times the strength would do%n", &value, &end) == 1 && end)
+    if (sscanf(t.reason, "%lf times the strength would do%n", &value, &times) == 1 && times)
       cav_command_tell_would_do(out, "", p, CAV_WOULD_DO_STRENGTH, value);
   }
   cav_tried_close(&t);
