@@ -130,6 +130,17 @@ inspected 0 "$root/problems/models/humanoid.xml"
 says out "knee_right           hinge  -149..1.72 deg     -190..190 N m     0 deg      + foot_right forwards"
 says out "hand_right           hand_right           capsule      0.03 0.0225"
 says out "keyframes: stand, squat, prone, supine"
+# one actuator for two joints, by a tendon
+cat >pair.xml <<'TEXT'
+<mujoco><worldbody><body><joint name="left" axis="0 1 0"/><geom size=".1"/></body><body pos="1 0 0"><joint name="right" axis="0 1 0"/>
+<geom size=".1"/></body></worldbody><tendon><fixed name="both"><joint joint="left" coef="1"/><joint joint="right" coef="-2"/></fixed></tendon>
+<actuator><motor tendon="both" gear="3" ctrllimited="true" ctrlrange="-1 2"/></actuator></mujoco>
+TEXT
+inspected 0 pair.xml
+says out "-3..6 N m *"
+says out "-12..6 N m *"
+says out "* by an actuator that moves other joints, too"
+inspected 0 "$root/problems/models/humanoid.xml"
 joint knee_right "foot_right forwards"
 joint abdomen_z "turns pelvis to the left"
 joint ankle_y_left "foot_left down"

@@ -107,15 +107,18 @@ static void print_bodies(const cav_model *m) {
   printf("\n");
 }
 
-// what actuators can give along a dof where the state is, N or N m; nothing where none moves it
-static void write_effort(const cav_model *m, cav_state *state, int dof, const char *unit, double *moment,
-                         char text[60]) {
+// what actuators can give along a dof where the state is, N or N m; nothing where none moves it. Returns whether one of them
+// moves other dofs, too
+static int write_effort(const cav_model *m, cav_state *state, int dof, const char *unit, double *moment,
+                        char text[60]) {
   double most[2] = {0, 0};
+  int shared = 0;
   *text = 0;
   for (int i = 0; i < m->nu; i++) {
     double range[2];
     cav_actuator_length(m, state, i, moment);
     if (moment[dof] == 0) continue;
+    for (int d = 0; d < m->nv; d++) shared |= d != dof && moment[d] != 0;
     cav_actuator_effort_range(m, i, range);
     most[0] += fmin(moment[dof] * range[0], moment[dof] * range[1]);
     most[1] += fmax(moment[dof] * range[0], moment[dof] * range[1]);
@@ -123,7 +126,8 @@ static void write_effort(const cav_model *m, cav_state *state, int dof, const ch
   if (isinf(most[0]) || isinf(most[1]))
     sprintf(text, "no limit");
   else if (most[0] != 0 || most[1] != 0)
-    sprintf(text, "%.3g..%.3g %s", most[0], most[1], unit);
+    sprintf(text, "%.3g..%.3g %s%s", most[0], most[1], unit, shared ? " *" : "");
+  return shared;
 }
 
 // Type and range of every joint, what actuators give along it, where it is at the posture of the file or the start of a problem,
@@ -135,6 +139,7 @@ static cav_status print_joints(const cav_model *m, const cav_problem *p, cav_err
   cav_status status = state ? cav_roles_find(m, state, &roles) : CAV_NO_MEMORY;
   if (!status) status = cav_position(m, state, q);
   double *moment = calloc((size_t)m->nv + 1, sizeof *moment);
+  int shared = 0;
   if (!status && !moment) status = CAV_NO_MEMORY;
   if (status) cav_file_fail(error, status, 0, "the joints cannot be evaluated");
   int width = 20;
@@ -147,7 +152,7 @@ static cav_status print_joints(const cav_model *m, const cav_problem *p, cav_err
     const int slides = joint->type == CAV_JOINT_SLIDE, scalar = slides || joint->type == CAV_JOINT_HINGE;
     char range[120], effort[60] = "", at[40] = "", sense[CAV_SENSE];
     write_range(joint, range);
-    if (scalar) write_effort(m, state, joint->dof, slides ? "N" : "N m", moment, effort);
+    if (scalar) shared |= write_effort(m, state, joint->dof, slides ? "N" : "N m", moment, effort);
     cav_sense_of(m, state, &roles, j, sense);
     if (scalar) snprintf(at, sizeof at, "%.4g %s", (slides ? 1 : 180 / M_PI) * q[joint->q] + 0.0, slides ? "m" : "deg");
     printf("%-*s %s", width, joint->name[0] ? joint->name : "(no name)", joint_name[joint->type]);
@@ -157,6 +162,7 @@ static cav_status print_joints(const cav_model *m, const cav_problem *p, cav_err
       printf(" %s", range);
     printf("\n");
   }
+  if (shared) printf("* by an actuator that moves other joints, too\n");
   if (m->njoint) printf("\n");
   free(moment);
   cav_state_free(state);
