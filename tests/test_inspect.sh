@@ -130,6 +130,12 @@ inspected 0 "$root/problems/models/humanoid.xml"
 says out "knee_right           hinge  -149..1.72 deg     -190..190 N m     0 deg      + foot_right forwards"
 says out "hand_right           hand_right           capsule      0.03 0.0225"
 says out "keyframes: stand, squat, prone, supine"
+# a thing in the air at the start falls, and its weight is not the humanoid's
+echo "<problem name='air' model='$root/problems/models/humanoid.xml'><scene><body name='ball' pos='.6 0 1'><freejoint name='ball'/>
+<geom name='ball' size='.1' mass='1'/></body></scene><horizon duration='2'/><start key='stand'/><cost/></problem>" >air.xml
+inspected 0 air.xml
+says out "note: at the start 'ball' touches nothing and is at rest, 0.9 m above what is below it: it falls"
+says out "mass 66 kg, 65 of it what actuators move"
 # one actuator for two joints, by a tendon
 cat >pair.xml <<'TEXT'
 <mujoco><worldbody><body><joint name="left" axis="0 1 0"/><geom size=".1"/></body><body pos="1 0 0"><joint name="right" axis="0 1 0"/>

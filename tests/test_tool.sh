@@ -466,6 +466,8 @@ sed 's/range="0 150"/range="10 150"/' monopod.xml >bent.xml
 sed 's/model="monopod.xml"/model="bent.xml"/; s/<start key="stand" height="floor"/<start height="floor"/' hop.xml >units.xml
 run 2 inspect units.xml
 says err "in the model's own configuration, with which a posture without 'key' begins; key=\"stand\""
+says err "outside its range 10 .. 150 degrees"
+says err 'degrees=/> inside sets it, ranges="clip" brings it in'
 # where nothing has to be met, and where nothing is driven, that is told
 echo '<problem name="idle" model="monopod.xml"><horizon duration="1" timestep="0.02"/><start><joint name="knee" degrees="1"/></start></problem>' >idle.xml
 run 0 inspect idle.xml
@@ -629,6 +631,7 @@ says err 'not in 1 s, but in 1.195 s, certified and achieved'
 says far.result/strategies.csv "longer,0,certified"
 run 1 explain far.result
 says out 'not in 1 s, but in 1.195 s, certified and achieved, times of windows in proportion; if it may last so long: <horizon duration="1" range="1 2"/>'
+check "a longer time is not more strength" sh -c '! grep -q "times as strong" out'
 says far.result/problem.xml 'duration="1"'
 
 # a block that is wanted lower than a sill lets it be leans on it (edges cost nothing here), and that is told; where forces of that fixed body cost it does not

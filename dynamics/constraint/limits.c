@@ -90,16 +90,15 @@ double cav_limit_activation(const cav_state *state, double margin) {
   return margin + cav_law_activation(state, self_smoothing(state), LIMIT_SPEED);
 }
 
-// one more row with its law; until then its sigma is the part of the smoothing distance that it takes. Friction loss (bound > 0)
-// has no position error; where the law is smoothed, its corners are rounded over the velocity at which a limit of the same
-// softness would be
+// one more row with its law, whose sigma is a distance until then. Friction loss (bound > 0) has no position error; where the law
+// is smoothed, its corners are rounded over the velocity at which a limit of the same softness would be
 static cav_status add_row(cav_state *state, cav_row row, const cav_softness *softness, double weight) {
   int friction = row.type == CAV_ROW_FRICTION_DOF || row.type == CAV_ROW_FRICTION_TENDON;
   cav_law l = row_law(state, softness, friction ? 0 : row.dist - row.margin, weight);
   row.regulariser = l.regulariser;
   row.damping = l.damping + (friction ? cav_friction_stops(state) : 0);
   row.stiffness = friction ? 0 : l.stiffness;
-  row.sigma = smoothing_scale(&l, row.sigma * self_smoothing(state));
+  row.sigma = smoothing_scale(&l, row.sigma);
   cav_row *slot = cav_row_push(state);
   if (!slot) { return CAV_NO_MEMORY; }
   *slot = row;
@@ -107,7 +106,9 @@ static cav_status add_row(cav_state *state, cav_row row, const cav_softness *sof
 }
 
 // a motor holds a joint where it stands; where there is none, friction and stops alone do
-static double rounding_of(const cav_joint *joint) { return joint->driven ? 1 : PASSIVE; }
+static double smoothing_of(const cav_state *state, const cav_joint *joint) {
+  return (joint->driven ? 1 : PASSIVE) * self_smoothing(state);
+}
 
 static cav_status add_friction(const cav_model *model, cav_state *state) {
   const cav_workspace *w = state->work;
@@ -117,13 +118,13 @@ static cav_status add_friction(const cav_model *model, cav_state *state) {
     const cav_dof *dof = &model->dof[k];
     cav_row row = {.type = CAV_ROW_FRICTION_DOF, .object = k, .axis = {1}};
     row.bound = state->options.timestep * dof->frictionloss;
-    row.sigma = rounding_of(&model->joint[dof->joint]);
+    row.sigma = smoothing_of(state, &model->joint[dof->joint]);
     status = add_row(state, row, &dof->friction, dof->inverse_weight);
   }
   for (int i = 0; i < w->ntendon_friction && !status; i++) {
     int k = w->tendon_friction[i];
     const cav_tendon *tendon = &model->tendon[k];
-    cav_row row = {.type = CAV_ROW_FRICTION_TENDON, .object = k, .axis = {1}, .sigma = 1};
+    cav_row row = {.type = CAV_ROW_FRICTION_TENDON, .object = k, .axis = {1}, .sigma = self_smoothing(state)};
     row.bound = state->options.timestep * tendon->frictionloss;
     status = add_row(state, row, &tendon->friction, tendon->inverse_weight);
   }
@@ -196,8 +197,9 @@ static cav_status add_joint_limit(const cav_model *model, cav_state *state, int 
   const double *at = w->q + joint->q, *range = joint->range;
   if (joint->type != CAV_JOINT_BALL && !(at[0] - range[0] < activation) && !(range[1] - at[0] < activation))
     return CAV_OK;
-  cav_row row = {.type = CAV_ROW_LIMIT_JOINT, .object = k, .margin = joint->margin, .sigma = rounding_of(joint)};
-  if (!joint->driven) row.margin -= BEHIND * PASSIVE * self_smoothing(state);
+  cav_row row = {
+      .type = CAV_ROW_LIMIT_JOINT, .object = k, .margin = joint->margin, .sigma = smoothing_of(state, joint)};
+  if (!joint->driven) row.margin -= BEHIND * row.sigma;
   if (joint->type != CAV_JOINT_BALL) return limit_scalar(state, row, at[0], range, &joint->limit, weight, activation);
   cav_status status = joint->limited ? limit_ball(state, row, joint, weight, activation) : CAV_OK;
   return status ? status : limit_cylinder(state, row, joint, weight, activation);
@@ -209,7 +211,7 @@ static cav_status add_tendon_limits(const cav_model *model, cav_state *state) {
   for (int i = 0; i < w->ntendon_limit && !status; i++) {
     int k = w->tendon_limit[i];
     const cav_tendon *tendon = &model->tendon[k];
-    cav_row row = {.type = CAV_ROW_LIMIT_TENDON, .object = k, .margin = tendon->margin, .sigma = 1};
+    cav_row row = {.type = CAV_ROW_LIMIT_TENDON, .object = k, .margin = tendon->margin, .sigma = self_smoothing(state)};
     status = limit_scalar(state, row, state->tendon_length[k], tendon->range, &tendon->limit, tendon->inverse_weight,
                           cav_limit_activation(state, tendon->margin));
   }

@@ -193,14 +193,15 @@ static const cav_row *limit_row(const cav_state *state, cav_row_type type, int o
   return nearest;
 }
 
-static double sense_limit(const cav_state *state, const cav_sensor *sensor) {
+static double sense_limit(const cav_model *model, const cav_state *state, const cav_sensor *sensor) {
   int tendon = sensor->object_type == CAV_OBJECT_TENDON;
   const cav_row *row = limit_row(state, tendon ? CAV_ROW_LIMIT_TENDON : CAV_ROW_LIMIT_JOINT, sensor->object);
   if (!row) { return 0; }
   switch (sensor->type) {
     case CAV_SENSOR_JOINTLIMITPOS:
     case CAV_SENSOR_TENDONLIMITPOS:
-      return row->dist - row->margin;
+      // of the model's own, not where a smoothed stop is set back to
+      return row->dist - (tendon ? model->tendon[row->object].margin : model->joint[row->object].margin);
     case CAV_SENSOR_JOINTLIMITVEL:
     case CAV_SENSOR_TENDONLIMITVEL:
       return row->velocity_next;
@@ -287,7 +288,7 @@ static void sense(const cav_model *model, cav_state *state, const cav_sensor *se
     case CAV_SENSOR_TENDONLIMITPOS:
     case CAV_SENSOR_TENDONLIMITVEL:
     case CAV_SENSOR_TENDONLIMITFRC:
-      out[0] = sense_limit(state, sensor);
+      out[0] = sense_limit(model, state, sensor);
       break;
     case CAV_SENSOR_TYPES:
       break;

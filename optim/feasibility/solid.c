@@ -113,9 +113,8 @@ static void examine_posture(cav_examination *e, const cav_state *state, const ch
     cure = "Change the posture; height='floor' lifts it onto a floor, cavort inspect shows its depths.";
   else if (fixed && floats)
     cure =
-        "Change the posture: to stand on that, rise='H' (its top over the floor) beside height='floor', or <root "
-        "pos='X "
-        "Y Z'/> with Z above it.";
+        "Change the posture: to stand on that, rise='H' (its top over the floor) beside height='floor', or "
+        "<root pos='X Y Z'/> with Z above it.";
   cav_impossible(e, CAV_CONDITION_SOLID, NULL, cure,
                  "%s: geom '%.100s' is %.3g mm inside '%.100s', and a certificate allows %g", which,
                  cav_geom_words(m, moves, one), -1e3 * deepest->dist, cav_geom_words(m, stands, other),

@@ -197,7 +197,7 @@ cav_status cav_run_solve(cav_solve_run *run, cav_error *error) {
   status = place < CAV_PLACE_DIAGNOSIS ? cav_solver_run(run, error) : CAV_NOT_CONVERGED;
   if (place <= CAV_PLACE_DIAGNOSIS) {
     // of rows that hold as a certificate asks nothing contradicts anything
-    const int hold = place < CAV_PLACE_DIAGNOSIS && (cav_run_met(run) || cav_run_weighed_met(run));
+    const int hold = place < CAV_PLACE_DIAGNOSIS && cav_run_weighed_met(run);
     if (status != CAV_NOT_CONVERGED || !o->diagnose || hold) return status;
     if (!cav_run_reaches(run, CAV_PLACE_DIAGNOSIS, &status)) return status;
     cav_status rest = cav_minimise_infeasibility(run);

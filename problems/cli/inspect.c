@@ -124,7 +124,7 @@ static int write_effort(const cav_model *m, cav_state *state, int dof, const cha
     most[1] += fmax(moment[dof] * range[0], moment[dof] * range[1]);
   }
   if (isinf(most[0]) || isinf(most[1]))
-    sprintf(text, "no limit");
+    sprintf(text, "no limit%s", shared ? " *" : "");
   else if (most[0] != 0 || most[1] != 0)
     sprintf(text, "%.3g..%.3g %s%s", most[0], most[1], unit, shared ? " *" : "");
   return shared;

@@ -112,28 +112,27 @@ static const struct {
      "to=\"1.2\"\n  weight=\"30\"/>, its scale about its target; none on it: help avoid",
      "touch"},
     {"avoid|avoided|untouched|collision|collisions|obstacle|obstacles",
-     "what must not be touched is a body of its own in <scene>, without joints. A cost on its forces keeps off it, and "
-     "is "
-     "often\n  easier to find: <force body=\"bar\" weight=\"100\"/>. That it was not touched, by more than 5 N, is "
-     "asked by\n"
-     "  <sensor type=\"touch\" body=\"bar\" within=\"5\" weight=\"0.01\"/> beside it, or of every solution by a "
-     "constraint:\n"
+     "what must not be touched is a body of its own in <scene>, without joints. A cost on its forces keeps off it, "
+     "and\n"
+     "  is often easier to find: <force body=\"bar\" weight=\"100\"/>. That it was not touched, by more than 5 N, is\n"
+     "  asked by <sensor type=\"touch\" body=\"bar\" within=\"5\" weight=\"0.01\"/> beside it, or of every solution "
+     "by\n"
      "  <constraint><sensor type=\"touch\" body=\"bar\" upper=\"0\"/></constraint>",
      "force"},
     {"grasp|grip|grab|pinch|gripper|attach|weld|rope|cable|string",
-     "no hand closes on a thing: it is held by friction and force, between two hands or the fingers of a model that "
-     "has "
-     "them.\n  What shall be fixed or hang on a rope for good is an <equality> or a <tendon> of the model's file",
-     NULL},
+     "nothing closes a hand by itself: a thing is held by force and friction, between two hands (carry) or by fingers\n"
+     "  that actuators of the model move. What is fixed or hangs on a rope for good is an <equality> or a <tendon> of\n"
+     "  the model's file",
+     "contact"},
     {"hold|held|keep|stay|still|freeze|rest|pause",
-     "a posture, place or angle is held by a term over a while: from=\"1\" to=\"2\" in place of at=; a whole motion "
-     "ends "
-     "at rest\n  unless <horizon close=\"open\"/> says that it need not",
+     "a posture, place or angle is held by a term over a while: from=\"1\" to=\"2\" in place of at=; a whole motion\n"
+     "  ends at rest unless <horizon close=\"open\"/> says that it need not; <guess type=\"hold\"/> begins with the\n"
+     "  start held",
      "within"},
     {"mass|weight|heavy|inertia|payload|gear|damping|frictionloss|armature",
      "mass, gear, damping and friction are of the model's file, or of a body of <scene>, as MJCF writes them; weight= "
-     "of a "
-     "term is\n  what missing it costs. cavort inspect MODEL says what bodies weigh and what actuators give",
+     "of\n"
+     "  a term is what missing it costs. cavort inspect MODEL says what bodies weigh and what actuators give",
      "terms"},
     {"cup|can|bottle|tool|block|crate|carton|payloads|load",
      "a thing is a <body> with a <freejoint> in <scene>: help move", NULL},
@@ -142,15 +141,16 @@ static const struct {
      "then",
      "horizon"},
     {"flight|fly|land|landing|airborne",
-     "of a way through the air <guess apex=\"0.3\" from=\"0.8\" to=\"1.3\"/> says how high and when: by gravity "
-     "an apex is\n  1.2 m times the square of the seconds between",
+     "of a way through the air <guess apex=\"0.3\" from=\"0.8\" to=\"1.3\"/> says how high and when: by gravity an "
+     "apex\n"
+     "  is 1.2 m times the square of the seconds between",
      "guess"},
     {"door|doors|drawer|lid|lever|hinge|gate|push|pull|carry|lift|throw|move",
-     "what no actuator moves stands in <scene> as a <body> with a <freejoint>, or with a <joint type=\"hinge\"> or "
-     "slide; "
-     "it is wanted\n  by its place, <sensor type=\"framepos\" body=\"box\" .../>, or its joint, <sensor "
-     "type=\"jointpos\" "
-     "joint=\"door\" .../>, and hands are\n  brought to it. What nothing stops at the end: <horizon close=\"open\"/>",
+     "what no actuator moves stands in <scene> as a <body> with a <freejoint>, or with a <joint> of type hinge or "
+     "slide;\n"
+     "  it is wanted by its place, <sensor type=\"framepos\" body=\"box\" .../>, or its joint,\n"
+     "  <sensor type=\"jointpos\" joint=\"door\" .../>, and hands are brought to it. What nothing stops at the end:\n"
+     "  <horizon close=\"open\"/>",
      "jointpos"},
     {"jump|hop|walk|kick|climb|crawl|roll|backflip|cartwheel|handstand|dance|motions|examples",
      "motions of the project stand in problems/motions; cavort new MODEL --like jump writes one for a model", "new"},
