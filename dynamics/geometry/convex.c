@@ -29,8 +29,8 @@ enum { NEAR_MAX = 12, FLAT_MAX = 8, FEATURES_MAX = NEAR_MAX + NEAR_MAX * (NEAR_M
 static const double FEW = 1e-6, MEETS = 1e-2, SQUARE = 1e-9, PARALLEL = 1e-14;
 // fractions of the size: gaps that are equal; points that lie across from each other, or nearly
 static const double LEAST_GAIN = 1e-13, ACROSS = 1e-12, NEARLY_ACROSS = 1e-9;
-// fraction of the size by which the polish improves on a search that has not ended
-static const double LOOSE = 1e-6;
+// fraction of the size by which the polish improves on a search that has not ended; to which faces of meshes are flat (hull.c)
+static const double LOOSE = 1e-6, EVEN = 1e-6;
 
 /// What of a body may meet the other: a corner, an edge or a face, or of a curved body what its support follows.
 typedef struct feature {
@@ -442,6 +442,14 @@ static int is_proven_apart(const search *g) {
   return gap > 0 && miss < NEARLY_ACROSS * g->size && miss * miss < 2 * gap * LEAST_GAIN * g->size;
 }
 
+// whether what meets is a face of a mesh, which is even to its tolerance only: no points lie across from each other to less than
+// that, and the distance is known as well from above, by the points that a search has found
+static int is_even(const search *g, double found) {
+  const candidate *c = &g->best;
+  return c->separation.corners > 2 && c->separation.gap > 0 && c->miss < EVEN * g->size &&
+         c->separation.gap > found - EVEN * g->size;
+}
+
 // all pairs of features about a direction, again about the best of them until that is proven, or its gap falls short of
 // least; 1 if it is proven
 static int polish(search *g, const double start[3], double least) {
@@ -559,7 +567,7 @@ int cav_separation_solve(const cav_shape *a, const cav_shape *b, double margin, 
     if (!again && !cav_separation_find(&ca, &cb, g.size, most, out)) return 0;
     if (many && out->gap > 0) {
       g.meets = FEW;
-      proven = polish(&g, out->n, 0);
+      proven = polish(&g, out->n, 0) || is_even(&g, out->gap);
       g.meets = MEETS;
     }
   }

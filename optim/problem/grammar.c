@@ -11,11 +11,9 @@ const char *const cav_problem_orders[] = {CAV_ORDERS(WORD_TEXT) NULL};
 const char *const cav_problem_closings[] = {"open", "rest", NULL};
 const char *const cav_problem_guesses[] = {
     [CAV_GUESS_HOLD] = "hold", [CAV_GUESS_INTERPOLATE] = "interpolate", [CAV_GUESS_PUMP] = "pump", NULL};
-const char *const cav_problem_dof_sets[] = {[CAV_DOFS_ALL] = "all",
-                                            [CAV_DOFS_ROOT_LINEAR] = "root_linear",
-                                            [CAV_DOFS_ROOT_ANGULAR] = "root_angular",
-                                            [CAV_DOFS_JOINTS] = "joints",
-                                            NULL};
+const char *const cav_problem_dof_sets[] = {
+    [CAV_DOFS_ALL] = "all",       [CAV_DOFS_ROOT_LINEAR] = "root_linear", [CAV_DOFS_ROOT_ANGULAR] = "root_angular",
+    [CAV_DOFS_JOINTS] = "joints", [CAV_DOFS_DRIVEN] = "driven",           NULL};
 #define SENSOR_NAME(type, name, ...) [CAV_SENSOR_##type] = name,
 static const char *const sensors[CAV_SENSOR_TYPES + 1] = {CAV_SENSORS(SENSOR_NAME)};
 const char *const cav_problem_springs[] = {CAV_SPRINGS(WORD_TEXT) NULL};
@@ -129,7 +127,7 @@ static const cav_xml_element pose = {
 #define WITHIN_edge_force
 #define WITHIN_self_force
 #define DOFS                                                                                                           \
-  WORD("dofs", cav_problem_dof_sets, "joints", "dofs that count: joints are all but free joints, of things of the scene, too"),                     \
+  WORD("dofs", cav_problem_dof_sets, "joints", "dofs that count: joints are all but free joints, of things of the scene, too; driven are those of trees that an actuator moves"), \
   TEXT("joint", "(dofs)", "one joint in the place of a set of dofs")
 #define RATE_ATTRIBUTES                                                                                                \
   DOFS, TABLE, REALS("target", 1, 0, "of the term", "(0)", "wanted rate: one number, or one for each selected dof")

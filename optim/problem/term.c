@@ -81,6 +81,8 @@ int cav_problem_selects(const cav_model *m, const cav_term *term, int d) {
       return free && place >= 3;
     case CAV_DOFS_JOINTS:
       return !free;
+    case CAV_DOFS_DRIVEN:
+      return !free && m->link[joint->link].driven;
     case CAV_DOFS_ONE:
       return m->dof[d].joint == term->joint;
   }

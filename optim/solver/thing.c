@@ -14,6 +14,9 @@
 /// Weight of the terms that lead.
 static const double weight = 300;
 
+/// m: what is nearer touches; vertical part of a normal by which it bears.
+static const double touching = 2e-3, upward = 0.7;
+
 /// Whether no actuator moves a link that can move.
 static int is_left(const cav_model *m, int link) { return link > 0 && !m->link[link].driven; }
 
@@ -144,11 +147,34 @@ static cav_status find_of_goal(const cav_problem *p, int lifted, cav_state *stat
   return CAV_OK;
 }
 
+/// Whether something driven bears a link at the start: a ball on a beam, a cup on a tray. No hand is brought to the side of that.
+static cav_status find_bearer(const cav_problem *p, int link, int *borne) {
+  const cav_model *m = p->model;
+  cav_state *state = cav_state_new(m);
+  cav_status status = state ? CAV_OK : CAV_NO_MEMORY;
+  *borne = 0;
+  // contacts are listed that are so far apart
+  if (state) state->options.smoothing = touching;
+  if (!status) status = cav_position(m, state, p->q_start);
+  for (int i = 0; !status && i < state->ncontact; i++) {
+    const cav_contact *c = &state->contact[i];
+    const int other = c->link1 == link ? c->link2 : c->link2 == link ? c->link1 : 0;
+    const double up = c->link2 == link ? c->frame[2] : -c->frame[2];
+    if (other > 0 && m->link[other].driven && c->dist <= touching && up >= upward) *borne = 1;
+  }
+  cav_state_free(state);
+  return status;
+}
+
 cav_status cav_thing_find(const cav_problem *problem, int lifted, cav_state *state, cav_thing *thing) {
   *thing = (cav_thing){.link = 0, .joint = -1};
+  int borne = 0;
   cav_status status = cav_position(problem->model, state, problem->q_start);
   if (!status) status = find_of_terms(problem, lifted, state, thing);
-  return status || thing->link ? status : find_of_goal(problem, lifted, state, thing);
+  if (!status && !thing->link) status = find_of_goal(problem, lifted, state, thing);
+  if (!status && thing->link) status = find_bearer(problem, thing->link, &borne);
+  if (borne) thing->link = 0;
+  return status;
 }
 
 double cav_geom_exit(const cav_geom *geom, const cav_pose *pose, const double n[3]) {

@@ -18,8 +18,8 @@ typedef struct cav_thing {
 #define CAV_THING_WAY 0.02
 
 /// The first link that terms ask for elsewhere, or else the goal: along the ground, with lifted also up. What turns on a hinge or
-/// slides, a door or a drawer, is asked for by its joint's angle or place. CAV_NO_MEMORY, or what
-/// the dynamics says of start and goal; the state is at one of them after that.
+/// slides, a door or a drawer, is asked for by its joint's angle or place. None is found of what something driven bears at the
+/// start. CAV_NO_MEMORY, or what the dynamics says of start and goal; the state is at one of them after that.
 cav_status cav_thing_find(const cav_problem *problem, int lifted, cav_state *state, cav_thing *thing);
 
 /// The centre of a link's mass, how far its surface is from there along the unit direction n, and how low it comes.

@@ -136,6 +136,8 @@ int cav_verification_selects(const cav_model *model, const cav_term *term, int d
       return free && place >= 3;
     case CAV_DOFS_JOINTS:
       return !free;
+    case CAV_DOFS_DRIVEN:
+      return !free && model->link[joint->link].driven;
     case CAV_DOFS_ONE:
       return model->dof[dof].joint == term->joint;
   }

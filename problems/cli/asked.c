@@ -26,7 +26,8 @@ typedef struct comparison {
 
 int cav_command_base(const cav_problem *p, const cav_term *term) {
   const cav_model *m = p->model;
-  if (term->quantity != CAV_QUANTITY_CONFIGURATION || term->dofs != CAV_DOFS_JOINTS) return -1;
+  if (term->quantity != CAV_QUANTITY_CONFIGURATION || (term->dofs != CAV_DOFS_JOINTS && term->dofs != CAV_DOFS_DRIVEN))
+    return -1;
   for (int j = 0; j < m->njoint; j++)
     if (m->joint[j].type == CAV_JOINT_FREE && cav_command_is_loose(m, m->joint[j].link)) return j;
   return -1;
@@ -126,6 +127,7 @@ static int farthest(const cav_problem *p, const cav_term *term, const double *wa
     const int free = joint->type == CAV_JOINT_FREE,
               line = joint->type == CAV_JOINT_SLIDE || (free && i < joint->dof + 3);
     const int selected = term->dofs == CAV_DOFS_ALL || (term->dofs == CAV_DOFS_JOINTS && !free) ||
+                         (term->dofs == CAV_DOFS_DRIVEN && !free && m->link[joint->link].driven) ||
                          (term->dofs == CAV_DOFS_ROOT_LINEAR && free && line) ||
                          (term->dofs == CAV_DOFS_ROOT_ANGULAR && free && !line) ||
                          (term->dofs == CAV_DOFS_ONE && m->dof[i].joint == term->joint);

@@ -433,8 +433,8 @@ static void print_window(const cav_problem *p, const cav_term *term) {
 }
 
 static void print_quantity(const cav_problem *p, const cav_term *term) {
-  static const char *const dofs[] = {"all dofs", "translation of free roots", "rotation of free roots",
-                                     "all but free roots", "joint"};
+  static const char *const dofs[] = {"all dofs",           "translation of free roots", "rotation of free roots",
+                                     "all but free roots", "joints of what is driven",  "joint"};
   const cav_model *m = p->model;
   if (term->quantity != CAV_QUANTITY_SENSOR) printf("%s", cav_quantity_rule_of(term->quantity)->words);
   if (cav_term_has_dofs(term)) {

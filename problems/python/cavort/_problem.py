@@ -246,7 +246,7 @@ class Problem:
         own. norm: "square", or "absolute" (linear far beyond the scale). Attributes are those of problem files:
 
         target (numbers; of a posture q [nq]) or waypoints [(time, target), ...]; at (s) or window (from, to); scale; within
-        (tolerance: a number or "any"); name; dofs ("all", "root_linear", "root_angular", "joints") or joint; of a sensor type
+        (tolerance: a number or "any"); name; dofs ("all", "root_linear", "root_angular", "joints", "driven") or joint; of a sensor type
         and one of body, xbody, site, geom, joint, tendon, actuator, or sensor (one of the model's), component ("x", "y", "z"),
         relative ("start" or "goal": the target counts from the reading there); body, of contacts.
         """

@@ -249,6 +249,7 @@ def select_dofs(model: Model, dofs: int, joint: int) -> NDArray[np.bool_]:
         lib.CAV_DOFS_ROOT_LINEAR: free & (place < 3),
         lib.CAV_DOFS_ROOT_ANGULAR: free & (place >= 3),
         lib.CAV_DOFS_JOINTS: ~free,
+        lib.CAV_DOFS_DRIVEN: ~free & (model.link["driven"][model.joint["link"][of]] != 0),
         lib.CAV_DOFS_ONE: of == joint,
     }
     return chosen[dofs]
