@@ -260,6 +260,25 @@ inspected 0 p.xml
 not_said "tabletop', inside"
 check "it lies on the table" grep -qE "^  box .* 1.000 +0.000 +0.800$" out
 
+# --- what touches what else than the world; what is let go falls, and a motor that is too weak is told before that ---
+
+cat >paddle.xml <<'TEXT'
+<mujoco><worldbody><body name="paddle" pos="0 0 1"><joint name="paddle" type="slide" axis="0 0 1"/><geom name="paddle" type="box"
+size=".2 .2 .02" mass=".5"/></body><body name="ball" pos="0 0 1.5"><joint name="ball" type="slide" axis="0 0 1"/><geom name="ball" size=".03"
+mass=".1"/></body></worldbody><actuator><motor joint="paddle" ctrlrange="-40 40" ctrllimited="true"/></actuator></mujoco>
+TEXT
+cat >paddled.xml <<'TEXT'
+<problem name="paddled" model="paddle.xml"><horizon duration="1"/><start/><goal><joint name="ball" pos="-0.45"/></goal><cost/></problem>
+TEXT
+inspected 0 paddled.xml
+says out "note: at the start nothing holds 'ball', which no actuator moves: it begins to move along its joint 'ball', as is right of what is let go"
+not_said "cannot be held"
+check "in the air" grep -qE "^  start  .* m, touches nothing of the world$" out
+check "on the paddle" grep -qE "^  goal   .* m, paddle touches ball$" out
+sed -i 's/-40 40/-1 1/; s/mass=".1"/mass="1"/' paddle.xml
+inspected 0 paddled.xml
+check "the motor is told" grep -q "^note: at rest, posture 'start' cannot be held at 0.025 s: with actuator .* joint 'paddle' needs 4.905 N" out
+
 # --- a model that solve refuses ---
 
 cat >muscle.xml <<TEXT
