@@ -323,6 +323,21 @@ inspected 0 block.xml
 check "the guess runs into the block" grep -qE "^note: the guess runs into a solid, deepest [0-9.]+ mm at [0-9.]+ s: '.*' in 'block'" out
 inspected 0 "$root/problems/motions/turn-over/problem.xml"
 not_said "note: the guess runs"
+# links of one body, and a body in a thing, are no solids
+posture <<'TEXT'
+<start key="stand"><joint name="hip_x_right" degrees="15"/><joint name="hip_x_left" degrees="15"/><joint name="hip_y_right" degrees="-20"/>
+<joint name="hip_y_left" degrees="20"/></start><goal key="stand"><joint name="hip_x_right" degrees="15"/><joint name="hip_x_left" degrees="15"/>
+<joint name="hip_y_right" degrees="20"/><joint name="hip_y_left" degrees="-20"/></goal>
+TEXT
+inspected 0 p.xml
+check "legs that cross" grep -qE "^note: links of the guess run into each other, deepest [0-9.]+ mm at [0-9.]+ s: '.*' in '.*' \(.*\): solve begins so, and its first stages let links of one body through each other" out
+posture <<'TEXT'
+<scene><body name="ball" pos="1 0 1"><freejoint name="ball"/><geom name="ball" size=".1" mass="1"/></body></scene>
+<start key="stand" height="floor"><root joint="ball" pos="1 0 1" height="keep"/></start>
+<goal key="stand" height="floor"><root joint="ball" pos="-1 0 1" height="keep"/></goal>
+TEXT
+inspected 0 p.xml
+check "a ball through a trunk" grep -qE "^note: bodies of the guess run into each other, deepest [0-9.]+ mm at [0-9.]+ s: .* solve begins so, and contacts that are soft at first part them; or give <waypoint>s$" out
 
 [ "$failed" -eq 0 ] && echo "$checks checks"
 exit "$failed"
