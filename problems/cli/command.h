@@ -238,8 +238,8 @@ int cav_command_floats(const cav_model *model, int root);
 /// The same, where an actuator moves its root, too, so that a motion of it is meant. postures.c.
 int cav_command_is_loose(const cav_model *model, int root);
 
-/// Says of terms that ask for one component in a body's principal axes that these are turned from its own; their
-/// number. axes.c.
+/// Says of terms that ask for a component, a direction or an orientation in a body's principal axes that these are turned
+/// from its own; their number. axes.c.
 int cav_command_tell_axes(FILE *out, const cav_problem *problem);
 
 /// Tells which solids of the world a motion leans on that neither its first nor its last knot touches, and that it never
