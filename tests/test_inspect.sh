@@ -54,10 +54,12 @@ brief terms.xml
 check "brief: status $status" [ "$status" -eq 0 ]
 check "brief is short: $(wc -l <out) lines" [ "$(wc -l <out)" -lt 40 ]
 check "running costs in a line" grep -q "^  running costs by weight: effort 1, joint velocity 0.05, " out
+not_said "takes the place of"
 says out "  goal   no <goal>: the goal posture is the start"
 says out "  weight 900        'final': posture of all dofs to the goal at 1 s; to be met within 0.1 rad, 0.03 m (usual)"
 row "'near' z, m" -1.9 -1.9 -1.9
 row "'soft', N" - - 0
+says out "  -: not known of a posture: forces, and velocities but those of <start>"
 row "'level', rad" "0 off" "0 off" "0 off"
 row "'hint', m" "0 0 1.5" "0 0 1.5" "0 0 1.5"
 not_said "an evaluation of the inverse"
@@ -100,6 +102,33 @@ row "posture, farthest pivot, rad" 0 0.5 0.5
 asked '<sensor name="swung" type="framezaxis" xbody="rod" target="1 0 0" at=".5" weight="9"/>'
 not_said "disagrees"
 goal=
+not_said "not known of a posture"
+# targets without digits that are rounding
+asked '<sensor name="aside" type="framepos" body="box" component="y" target="-1e-18" at="end" weight="9"/>'
+says out "'aside': framepos of box, y to 0 at 1 s"
+# whom running costs are for, and the defaults of all joints in whose place costs of one are
+asked '<velocity joint="pivot" weight="1"/><force body="box" weight="100"/><posture dofs="root_linear" weight="10"/><impact name="soft" body="box" weight="3"/>'
+check "whom a running cost is for" sh -c 'tr -s " \n" " " <out | grep -qF "velocity of pivot 1, force of box 100, posture of root_linear 10, soft 3 note"'
+says out "  note: <posture dofs=\"root_linear\"> takes the place of the default 'posture' 0.1 of all joints: state that again where it is wanted"
+not_said "joint velocity"
+# two joints, one of them left out; weight 0 of one has no other any more, either
+cat >arm.xml <<'TEXT'
+<mujoco><worldbody><body name="upper"><joint name="shoulder" axis="0 1 0"/><geom name="upper" size=".05"/><body name="fore" pos=".5 0 0">
+<joint name="elbow" axis="0 1 0"/><geom name="fore" size=".05"/></body></body></worldbody></mujoco>
+TEXT
+for cost in '<velocity joint="elbow" weight="1"/>' '<velocity joint="elbow" weight="0"/>'; do
+  echo "<problem name='arm' model='arm.xml'><horizon duration='1'/><start/><cost>$cost</cost></problem>" >narrow.xml
+  brief narrow.xml
+  says out "  note: <velocity joint=\"elbow\"> takes the place of the default 'joint velocity' 0.05 of all joints: state that again where it is wanted"
+done
+for beside in '<velocity weight="0.05"/>' '<velocity joint="shoulder" weight="0.05"/>'; do
+  sed "s#</cost>#$beside&#" narrow.xml >stated.xml
+  brief stated.xml
+  not_said "takes the place of"
+done
+sed 's/ weight="0"/ at="end"&/' narrow.xml >window.xml
+brief window.xml
+not_said "takes the place of"
 # a base that a posture of joints leaves open
 brief "$root/problems/motions/squat-jump/problem.xml" --set "cost/final posture/@dofs=joints"
 says out "; leaves height, place and tilt of the base open"
@@ -136,6 +165,31 @@ echo "<problem name='air' model='$root/problems/models/humanoid.xml'><scene><bod
 inspected 0 air.xml
 says out "note: at the start 'ball' touches nothing and is at rest, 0.9 m above what is below it: it falls"
 says out "mass 66 kg, 65 of it what actuators move"
+# principal axes that are turned from the body's own, and directions in the file's axes
+turned() {
+  { sed 's#<cost/></problem>##' air.xml && echo "<cost>$1</cost></problem>"; } >turned-axes.xml
+  inspected 0 turned-axes.xml
+}
+turned '<sensor name="upright" type="framezaxis" body="torso" target="0 0 1" at="end" weight="9"/>'
+says out "note: 'upright' reads axis z of the principal axes of inertia of body 'torso', turned by 90 degrees from the body's own: xbody=\"torso\" has that of the file"
+turned '<sensor name="upright" type="framequat" body="torso" target="1 0 0 0" at="end" weight="9"/>'
+says out "note: 'upright' reads the orientation of the principal axes of inertia of body 'torso', turned by 90 degrees"
+turned '<sensor name="upright" type="framezaxis" xbody="torso" target="0 0 1" at="end" weight="9"/>
+<sensor name="as there" type="framequat" body="torso" relative="goal" at="end" weight="9"/>
+<sensor name="level" type="framezaxis" body="ball" target="0 0 1" at="end" weight="9"/>'
+not_said "principal axes"
+# terms of free roots count things, too; what need not be met, and what names all dofs, does so as it says
+turned '<posture name="final uprightness" dofs="root_angular" at="end" weight="9"/>'
+says out "note: 'final uprightness' counts 'ball', too, which no actuator moves: <sensor type=\"framequat\" xbody=\"torso\" relative=\"goal\" .../> is of 'torso' alone"
+turned '<velocity dofs="root_linear" at="end" weight="9"/>'
+says out "note: velocity counts 'ball', too, which no actuator moves: <sensor type=\"framelinvel\" xbody=\"torso\" .../> is of 'torso' alone"
+turned '<posture dofs="root_angular" weight="9"/><velocity dofs="root_linear" at="end" weight="9" within="any"/>
+<velocity dofs="all" at="end" weight="9"/><posture joint="root" at="end" weight="9"/>'
+not_said "counts 'ball'"
+# no geom to stand on
+echo '<mujoco><worldbody><body><freejoint/><geom size=".1" contype="0" conaffinity="0"/></body></worldbody></mujoco>' >ghost.xml
+inspected 0 ghost.xml
+says out "no geom can touch another, so nothing stands on the ground or on anything else"
 # one actuator for two joints, by a tendon
 cat >pair.xml <<'TEXT'
 <mujoco><worldbody><body><joint name="left" axis="0 1 0"/><geom size=".1"/></body><body pos="1 0 0"><joint name="right" axis="0 1 0"/>
@@ -260,6 +314,25 @@ inspected 0 p.xml
 not_said "tabletop', inside"
 check "it lies on the table" grep -qE "^  box .* 1.000 +0.000 +0.800$" out
 
+# --- what touches what else than the world; what is let go falls, and a motor that is too weak is told before that ---
+
+cat >paddle.xml <<'TEXT'
+<mujoco><worldbody><body name="paddle" pos="0 0 1"><joint name="paddle" type="slide" axis="0 0 1"/><geom name="paddle" type="box"
+size=".2 .2 .02" mass=".5"/></body><body name="ball" pos="0 0 1.5"><joint name="ball" type="slide" axis="0 0 1"/><geom name="ball" size=".03"
+mass=".1"/></body></worldbody><actuator><motor joint="paddle" ctrlrange="-40 40" ctrllimited="true"/></actuator></mujoco>
+TEXT
+cat >paddled.xml <<'TEXT'
+<problem name="paddled" model="paddle.xml"><horizon duration="1"/><start/><goal><joint name="ball" pos="-0.45"/></goal><cost/></problem>
+TEXT
+inspected 0 paddled.xml
+says out "note: at the start nothing holds 'ball', which no actuator moves: it begins to move along its joint 'ball', as is right of what is let go"
+not_said "cannot be held"
+check "in the air" grep -qE "^  start  .* m, touches nothing of the world$" out
+check "on the paddle" grep -qE "^  goal   .* m, paddle touches ball$" out
+sed -i 's/-40 40/-1 1/; s/mass=".1"/mass="1"/' paddle.xml
+inspected 0 paddled.xml
+check "the motor is told" grep -q "^note: at rest, posture 'start' cannot be held at 0.025 s: with actuator .* joint 'paddle' needs 4.905 N" out
+
 # --- a model that solve refuses ---
 
 cat >muscle.xml <<TEXT
@@ -304,6 +377,21 @@ inspected 0 block.xml
 check "the guess runs into the block" grep -qE "^note: the guess runs into a solid, deepest [0-9.]+ mm at [0-9.]+ s: '.*' in 'block'" out
 inspected 0 "$root/problems/motions/turn-over/problem.xml"
 not_said "note: the guess runs"
+# links of one body, and a body in a thing, are no solids
+posture <<'TEXT'
+<start key="stand"><joint name="hip_x_right" degrees="15"/><joint name="hip_x_left" degrees="15"/><joint name="hip_y_right" degrees="-20"/>
+<joint name="hip_y_left" degrees="20"/></start><goal key="stand"><joint name="hip_x_right" degrees="15"/><joint name="hip_x_left" degrees="15"/>
+<joint name="hip_y_right" degrees="20"/><joint name="hip_y_left" degrees="-20"/></goal>
+TEXT
+inspected 0 p.xml
+check "legs that cross" grep -qE "^note: links of the guess run into each other, deepest [0-9.]+ mm at [0-9.]+ s: '.*' in '.*' \(.*\): solve begins so, and its first stages let links of one body through each other" out
+posture <<'TEXT'
+<scene><body name="ball" pos="1 0 1"><freejoint name="ball"/><geom name="ball" size=".1" mass="1"/></body></scene>
+<start key="stand" height="floor"><root joint="ball" pos="1 0 1" height="keep"/></start>
+<goal key="stand" height="floor"><root joint="ball" pos="-1 0 1" height="keep"/></goal>
+TEXT
+inspected 0 p.xml
+check "a ball through a trunk" grep -qE "^note: bodies of the guess run into each other, deepest [0-9.]+ mm at [0-9.]+ s: .* solve begins so, and contacts that are soft at first part them; or give <waypoint>s$" out
 
 [ "$failed" -eq 0 ] && echo "$checks checks"
 exit "$failed"

@@ -58,7 +58,8 @@ done
 check "a posture by its name" says kneel "kneel: a posture of any humanoid"
 check "with the others" says kneel "  all-fours"
 check "a role by its own name" says hand 'body="hand"'
-for word in achieved certified optimal stand keyframe axis floor knee dt tolerance units left; do
+for word in achieved certified optimal stand keyframe axis floor knee dt tolerance units left catch rolling root_angular principal stop limit fast \
+  minimum lock handle; do
   check "help of $word" says "$word" "$word: "
 done
 check "what is meant comes first" sh -c "'$tool' help floor | head -n 1 | grep -q '^floor: .*<scene>'"
@@ -91,6 +92,13 @@ for word in force gap impact clearance edge_force self_force self_penetration; d
   check "$word has no tolerance" sh -c "! '$tool' help $word | grep -q '^  within '"
 done
 check "slip has one" says slip "  within "
+check "order, axes and units of qvel" says qvel "in the order of the joints of the model and then of the <scene> (inspect --all lists them); a free joint has 3 in m/s along the world's axes and then 3 in rad/s about its body's own"
+for word in velocity posture acceleration; do
+  check "$word of one joint replaces the defaults" says "$word" "a cost of it over the whole motion takes the place of the default costs of its kind, which are of all joints"
+done
+check "roots are those of things, too" says dofs "of things of the scene, too: joints are all but free joints, root_linear and root_angular"
+check "what begins inside a solid is not stopped by it" says rise "what stands in the way down stops it, unless it begins inside that"
+check "principal axes of a body" says body "along its principal axes of inertia, which may be turned from its own"
 check "who has a tolerance" says within "attribute within of <sensor> <posture> <velocity> <acceleration> <effort> <power>"
 
 # --- the schema ---

@@ -507,6 +507,7 @@ typedef struct cav_impossibility {
   cav_condition condition; ///< that is broken
   int term;                ///< that asks for it, -1: none
   int knot;                ///< at which
+  int joint;               ///< that lacks force against gravity (CAV_CONDITION_STRENGTH), -1: none
   char what[400];          ///< the cause, in words
   char cure[160];          ///< what helps
 } cav_impossibility;

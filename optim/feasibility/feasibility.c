@@ -26,6 +26,7 @@ void cav_impossible(cav_examination *e, cav_condition condition, const cav_requi
   cav_impossibility *found = &proof->said;
   *proof = (cav_proof){.kind = r ? r->kind : 0, .object = r ? r->object : -1};
   *found = (cav_impossibility){.condition = condition, .term = r ? r->term : -1, .knot = r ? r->knot : 0};
+  found->joint = -1;
   va_list arguments;
   va_start(arguments, format);
   vsnprintf(found->what, sizeof found->what, format, arguments);

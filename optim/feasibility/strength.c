@@ -18,6 +18,7 @@
 enum { SWEEPS = 400 };
 static const double near_contact = 0.02, near_limit = 0.05; // m, and m or rad: what may bear
 static const double most_load = 1000;                       // of the weight
+static const double unmoved = 0.01; // how much of the force that it lacks counts of what no actuator moves
 
 /// Forces that can act: columns, each with bounds of its factor.
 typedef struct bearing {
@@ -218,9 +219,13 @@ static void tell(cav_examination *e, const bearing *b, const double *need, const
   const cav_requirement at = {.term = term, .knot = t};
   char name[CAV_WORDS], joint[48];
   double time = t * e->problem->timestep;
-  int weak = weakest(b, left, m->nu), worst = 0;
-  for (int d = 0; d < m->nv; d++)
-    if (fabs(left[d]) > fabs(left[worst])) worst = d;
+  int weak = weakest(b, left, m->nu), worst = 0, before = e->nfound;
+  // where actuators move something that lacks force, that: what nothing moves may be meant to fall
+  double most = 0;
+  for (int d = 0; d < m->nv; d++) {
+    const double size = fabs(left[d]) * (m->link[m->dof[d].link].driven ? 1 : unmoved);
+    if (size > most) most = size, worst = d;
+  }
   int j = m->dof[worst].joint;
   const char *unit =
       m->joint[j].type == CAV_JOINT_SLIDE || (m->joint[j].type == CAV_JOINT_FREE && worst < m->joint[j].dof + 3)
@@ -243,6 +248,7 @@ static void tell(cav_examination *e, const bearing *b, const double *need, const
     cav_impossible(e, CAV_CONDITION_STRENGTH, &at, "A posture that stands, or one that is not held.",
                    "posture '%.48s' cannot be held at %.4g s: %s, which no actuator or contact can give", held->name,
                    time, lacks);
+  if (e->nfound > before) e->found[before].said.joint = j;
 }
 
 /// The balance of a posture at rest.

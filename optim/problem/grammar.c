@@ -87,12 +87,12 @@ static const cav_xml_element pose_joint = {
   TEXT("file", "(the model's own configuration)", "trajectory.csv to take a knot of, relative to this file"),          \
   WORD("knot", ends, "last", "knot of that file"),                                                                     \
   WORD("height", heights, "keep", "floor: each tree that is free or slides upright is raised or lowered until it stands"), \
-  REAL("rise", 0, "m", "(0; what stands in the way down stops it)", "with height=\"floor\": so far above the plane, whatever lies between"), \
+  REAL("rise", 0, "m", "(0; what stands in the way down stops it, unless it begins inside that)", "with height=\"floor\": so far above the plane, whatever lies between"), \
   WORD("ranges", clippings, "keep", "clip: joints are brought into their ranges first, and tendons")
 static const cav_xml_element start = {
     "start", 1, 1,
     ATTRIBUTES(
-        POSE_SOURCE, REALS("qvel", 1, 0, "rad/s or m/s", "(zeros)", "velocity at the start (of the step that leads to it), nv numbers"),
+        POSE_SOURCE, REALS("qvel", 1, 0, "rad/s or m/s", "(zeros)", "velocity at the start (of the step that leads to it): a number a dof, in the order of the joints of the model and then of the <scene> (inspect --all lists them); a free joint has 3 in m/s along the world's axes and then 3 in rad/s about its body's own, a ball joint 3 in rad/s about its own"),
         WORD("velocity", rates, "rest", "file: the velocity at that knot of the file is the start's, too"),
         FLAG("free", "false", "posture and velocity at the start are found too: what stands here is where the guess starts")),
     CHILDREN(&pose_root, &pose_joint), 0, "posture and velocity that the motion begins with"};
@@ -127,8 +127,8 @@ static const cav_xml_element pose = {
 #define WITHIN_edge_force
 #define WITHIN_self_force
 #define DOFS                                                                                                           \
-  WORD("dofs", cav_problem_dof_sets, "joints", "dofs that count: joints are all but free joints, of things of the scene, too; driven are those of trees that an actuator moves"), \
-  TEXT("joint", "(dofs)", "one joint in the place of a set of dofs")
+  WORD("dofs", cav_problem_dof_sets, "joints", "dofs that count, of things of the scene, too: joints are all but free joints, driven those of them in trees that an actuator moves, root_linear and root_angular the translations and rotations of all free joints"),  \
+  TEXT("joint", "(dofs)", "one joint in the place of a set of dofs; a cost of it over the whole motion takes the place of the default costs of its kind, which are of all joints")
 #define RATE_ATTRIBUTES                                                                                                \
   DOFS, TABLE, REALS("target", 1, 0, "of the term", "(0)", "wanted rate: one number, or one for each selected dof")
 #define POSTURE_ATTRIBUTES                                                                                             \
@@ -137,8 +137,8 @@ static const cav_xml_element pose = {
 #define ONE_OBJECT "(give exactly one of body, xbody, geom, site, joint, tendon, actuator)"
 #define SENSOR_SOURCE                                                                                              \
   WORD("type", sensors, "(the sensor of the model by that name)", "what is read, by MJCF's names"),                    \
-  TEXT("body", ONE_OBJECT, "object: frame at the centre of mass of a body, with its principal axes; roles such as \"right foot\" stand for bodies"), \
-  TEXT("xbody", ONE_OBJECT, "object: frame of a body as the model's file writes it"),                          \
+  TEXT("body", ONE_OBJECT, "object: frame at the centre of mass of a body, along its principal axes of inertia, which may be turned from its own: directions and orientations are those of xbody; roles such as \"right foot\" stand for bodies"), \
+  TEXT("xbody", ONE_OBJECT, "object: frame of a body as the model's file writes it; roles, too"),                          \
   TEXT("geom", ONE_OBJECT, "object: a geom"), TEXT("site", ONE_OBJECT, "object: a site"),              \
   TEXT("joint", ONE_OBJECT, "object: a joint"), TEXT("tendon", ONE_OBJECT, "object: a tendon"),        \
   TEXT("actuator", ONE_OBJECT, "object: an actuator"),                                                         \

@@ -17,9 +17,10 @@ typedef struct cav_problem_owner {
   cav_problem problem;
   cav_model *model;
   cav_problem_block *block;
-  int goal;          ///< the file has a <goal>
-  char lowered[400]; ///< what height="floor" brought far down; "": nothing
-  char buried[400];  ///< what it brought out of a solid; "": nothing
+  int goal;           ///< the file has a <goal>
+  char lowered[400];  ///< what height="floor" brought far down; "": nothing
+  char buried[400];   ///< what it brought out of a solid; "": nothing
+  char replaced[600]; ///< default costs of all joints in whose place are costs of some; "": none
 } cav_problem_owner;
 
 /// A reading in progress.
@@ -63,6 +64,10 @@ char *cav_problem_text(cav_problem_owner *owner, const char *text);
 
 /// Whether the file of a problem has a <goal>; else the goal posture is the start. problem.c.
 int cav_problem_has_goal(const cav_problem *problem);
+
+/// Of a problem that cav_problem_load gave: the default costs of all joints in whose place its file has costs of some of them,
+/// and which, in words; "": none. term.c.
+const char *cav_problem_replaced(const cav_problem *problem);
 
 /// First child of that name, NULL if there is none; NULL node: NULL. problem.c.
 const cav_xml_node *cav_problem_child(const cav_xml_node *node, const char *name);

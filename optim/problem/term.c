@@ -619,13 +619,16 @@ static int has_window(const cav_xml_node *node) {
   return cav_xml_get(node, "from") || cav_xml_get(node, "to") || cav_xml_get(node, "at");
 }
 
-// whether the file has a cost of that quantity over the whole horizon, which takes the defaults' place
+// whether a cost is of that quantity and over the whole horizon, so that it takes the defaults' place
+static int replaces(const cav_xml_node *node, cav_quantity quantity) {
+  const int part = has_window(node) ||
+                   (cav_xml_accepts(node, "body") && cav_xml_get(node, "body") && !cav_xml_accepts(node, "type"));
+  return !part && !strcmp(node->rule->name, cav_quantity_rule_of(quantity)->name);
+}
+
 static int replaced(const cav_xml_node *cost, cav_quantity quantity) {
-  for (const cav_xml_node *node = cost ? cost->child : NULL; node; node = node->next) {
-    int part = has_window(node) ||
-               (cav_xml_accepts(node, "body") && cav_xml_get(node, "body") && !cav_xml_accepts(node, "type"));
-    if (!part && !strcmp(node->rule->name, cav_quantity_rule_of(quantity)->name)) return 1;
-  }
+  for (const cav_xml_node *node = cost ? cost->child : NULL; node; node = node->next)
+    if (replaces(node, quantity)) return 1;
   return 0;
 }
 
@@ -652,12 +655,44 @@ static void add_default(cav_problem *p, const cav_term *term) {
   for (int j = 0; j < m->njoint && posture; j++) wheels += cav_problem_is_wheel(m, j);
   if (!wheels) p->term[p->nterm++] = *term;
   for (int j = 0; j < m->njoint && wheels; j++) {
-    if (m->joint[j].type == CAV_JOINT_FREE || cav_problem_is_wheel(m, j)) continue;
+    if (!cav_problem_selects(m, term, m->joint[j].dof) || cav_problem_is_wheel(m, j)) continue;
     cav_term *one = &p->term[p->nterm++];
     *one = *term;
     one->dofs = CAV_DOFS_ONE;
     one->joint = j;
   }
+}
+
+// notes a default of all joints whose place is taken by costs of the file that leave some of these out
+static void note_replaced(const cav_problem_reader *reader, const cav_xml_node *cost, const cav_term *usual) {
+  const cav_model *m = reader->model;
+  const cav_xml_node *first = NULL;
+  int left = 0;
+  if (!cav_term_has_dofs(usual) || usual->dofs == CAV_DOFS_ROOT_ANGULAR || usual->dofs == CAV_DOFS_ROOT_LINEAR) return;
+  for (int d = 0; d < m->nv; d++) {
+    const int joint = m->dof[d].joint, posture = usual->quantity == CAV_QUANTITY_CONFIGURATION;
+    int selected = m->joint[joint].type == CAV_JOINT_FREE || (posture && cav_problem_is_wheel(m, joint)) ||
+                   !cav_problem_selects(m, usual, d);
+    for (const cav_xml_node *node = cost ? cost->child : NULL; node; node = node->next) {
+      cav_term term = cav_term_cost(usual->quantity, 0);
+      if (!replaces(node, usual->quantity)) continue;
+      if (!first) first = node;
+      // read before without a fault
+      if (!read_dofs(reader, node, &term)) selected |= cav_problem_selects(m, &term, d);
+    }
+    left |= !selected;
+  }
+  if (!first || !left) return;
+  const char *attribute = cav_xml_get(first, "joint") ? "joint" : "dofs";
+  char *text = reader->owner->replaced;
+  const size_t used = strlen(text);
+  snprintf(text + used, sizeof reader->owner->replaced - used,
+           "%s<%s %s=\"%.60s\"> takes the place of the default '%s' %g of all joints", used ? "; " : "",
+           first->rule->name, attribute, cav_xml_text(first, attribute, ""), usual->name, usual->weight);
+}
+
+const char *cav_problem_replaced(const cav_problem *problem) {
+  return ((const cav_problem_owner *)(const void *)problem)->replaced;
 }
 
 cav_status cav_problem_terms(const cav_problem_reader *reader) {
@@ -683,6 +718,7 @@ cav_status cav_problem_terms(const cav_problem_reader *reader) {
     status = read_term(reader, node, 0, &p->term[p->nterm], &n);
     p->nterm += cav_term_counts(&p->term[p->nterm]) ? n : 0;
   }
+  for (int i = 0; i < ndefault && !status; i++) note_replaced(reader, cost, &defaults[i]);
   for (const cav_xml_node *node = constraint ? constraint->child : NULL; node && !status; node = node->next) {
     int n;
     status = read_term(reader, node, 1, &p->term[p->nterm], &n);

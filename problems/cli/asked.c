@@ -66,8 +66,7 @@ static void unit_of(const cav_problem *p, const cav_term *term, char unit[16]) {
   snprintf(unit, 16, "%s", n == 1 ? tolerance[0].unit : "");
 }
 
-/// A number without the sign of a zero, and not in digits that are rounding.
-static double plain(double x) { return fabs(x) < 5e-7 ? 0 : x; }
+double cav_command_plain(double x) { return fabs(x) < 5e-7 ? 0 : x; }
 
 /// The reading of a sensor at a posture, as it is compared; "-": it has none.
 static void write_reading(const comparison *c, const cav_term *term, cav_state *state, double time, char *out) {
@@ -82,11 +81,11 @@ static void write_reading(const comparison *c, const cav_term *term, cav_state *
     if (term->target) target_at(term, time, 4, target);
     quat_normalise(target);
     cav_rotation_between(target, x, phi);
-    snprintf(out, CELL, "%.4g off", plain(term->component < 0 ? norm3(phi) : phi[term->component]));
+    snprintf(out, CELL, "%.4g off", cav_command_plain(term->component < 0 ? norm3(phi) : phi[term->component]));
   } else if (s->dim == 1 || term->component >= 0) {
-    snprintf(out, CELL, "%.4g", plain(x[s->dim == 1 ? 0 : term->component]));
+    snprintf(out, CELL, "%.4g", cav_command_plain(x[s->dim == 1 ? 0 : term->component]));
   } else {
-    snprintf(out, CELL, "%.4g %.4g %.4g", plain(x[0]), plain(x[1]), plain(x[2]));
+    snprintf(out, CELL, "%.4g %.4g %.4g", cav_command_plain(x[0]), cav_command_plain(x[1]), cav_command_plain(x[2]));
   }
 }
 
@@ -106,9 +105,10 @@ static void write_wanted(const cav_term *term, double time, char *out) {
   else {
     target_at(term, time, s->dim, target);
     if (one)
-      snprintf(out, CELL, "%.4g", plain(target[k]));
+      snprintf(out, CELL, "%.4g", cav_command_plain(target[k]));
     else
-      snprintf(out, CELL, "%.4g %.4g %.4g", plain(target[0]), plain(target[1]), plain(target[2]));
+      snprintf(out, CELL, "%.4g %.4g %.4g", cav_command_plain(target[0]), cav_command_plain(target[1]),
+               cav_command_plain(target[2]));
   }
 }
 
@@ -143,9 +143,9 @@ static void write_dof(const cav_model *m, const double *wanted, const double *q,
   const int place = d - joint->dof;
   if (joint->type == CAV_JOINT_BALL || (joint->type == CAV_JOINT_FREE && place >= 3)) {
     cav_difference(m, wanted, q, 1, work);
-    snprintf(out, CELL, "%.4g off", plain(work[d]));
+    snprintf(out, CELL, "%.4g off", cav_command_plain(work[d]));
   } else {
-    snprintf(out, CELL, "%.4g", plain(q[joint->q + place]));
+    snprintf(out, CELL, "%.4g", cav_command_plain(q[joint->q + place]));
   }
 }
 
@@ -187,8 +187,9 @@ static void write_name(const cav_problem *p, const cav_term *term, char name[NAM
     snprintf(name, NAME, "%s of %.40s", cav_sensor_rule_of(term->sensor.type)->name,
              cav_object_name(p->model, term->sensor.object_type, term->sensor.object));
   } else {
-    snprintf(name, NAME, "posture");
-    if (term->dofs == CAV_DOFS_ONE) snprintf(name, NAME, "posture of %.40s", p->model->joint[term->joint].name);
+    const char *quantity = cav_quantity_rule_of(term->quantity)->name;
+    snprintf(name, NAME, "%s", quantity);
+    if (term->dofs == CAV_DOFS_ONE) snprintf(name, NAME, "%s of %.40s", quantity, p->model->joint[term->joint].name);
   }
   const size_t used = strlen(name);
   if (sensor && term->component >= 0 && term->sensor.dim > 1)
@@ -218,16 +219,19 @@ static int write_row(const comparison *c, const cav_term *term, char name[NAME],
   return 1;
 }
 
-/// Prints the rows, or notes how wide their cells are.
-static void go_through(const comparison *c, int width[4], int print) {
+/// Prints the rows, or notes how wide their cells are. Returns whether a posture has no reading of one.
+static int go_through(const comparison *c, int width[4], int print) {
   char name[NAME], cell[3][CELL];
+  int unread = 0;
   for (int i = 0; i < c->p->nterm; i++) {
     if (!write_row(c, &c->p->term[i], name, cell)) continue;
     const char *text[4] = {name, cell[0], cell[1], cell[2]};
+    unread |= !strcmp(cell[0], "-") || !strcmp(cell[1], "-");
     for (int k = 0; k < 4 && !print; k++) width[k] = (int)fmax(width[k], (double)strlen(text[k]));
     if (print)
       printf("  %-*s  %*s  %*s  %*s\n", width[0], name, width[1], cell[0], width[2], cell[1], width[3], cell[2]);
   }
+  return unread;
 }
 
 cav_status cav_command_print_asked(const cav_problem *p, cav_error *error) {
@@ -248,7 +252,8 @@ cav_status cav_command_print_asked(const cav_problem *p, cav_error *error) {
       width[0] = (int)fmax(width[0], 20);
       printf("%-*s  %*s  %*s  %*s\n", width[0] + 2, "what start and goal have", width[1], "start", width[2], "goal",
              width[3], "wanted");
-      go_through(&c, width, 1);
+      if (go_through(&c, width, 1))
+        printf("  -: not known of a posture: forces, and velocities but those of <start>\n");
     }
   }
   cav_state_free(c.start);
@@ -310,6 +315,31 @@ static int tell_touch(FILE *out, const cav_problem *p, const cav_term *term) {
   return 1;
 }
 
+/// Of a term of free roots that has to be met and counts those of things beside those of bodies.
+static int tell_things(FILE *out, const cav_problem *p, const cav_term *term) {
+  const cav_model *m = p->model;
+  const int angular = term->dofs == CAV_DOFS_ROOT_ANGULAR, velocity = term->quantity == CAV_QUANTITY_VELOCITY;
+  int body = 0, thing = 0, things = 0;
+  char name[NAME];
+  if ((!velocity && term->quantity != CAV_QUANTITY_CONFIGURATION) || (!angular && term->dofs != CAV_DOFS_ROOT_LINEAR))
+    return 0;
+  for (int j = m->njoint - 1; j >= 0; j--) {
+    if (m->joint[j].type != CAV_JOINT_FREE) continue;
+    const int loose = !m->link[m->joint[j].link].driven;
+    *(loose ? &thing : &body) = m->joint[j].body;
+    things += loose;
+  }
+  if (!body || !things || !cav_term_tolerances(p, term, 0, NULL, NULL)) return 0;
+  fprintf(out, "note: %s counts '%.48s'", called(p, term, name), m->body[thing].name);
+  if (things > 1) fprintf(out, " and %d more", things - 1);
+  fprintf(out, ", too, which no actuator moves: <sensor type=\"%s\" xbody=\"%.48s\"%s .../> is of '%.48s' alone\n",
+          velocity  ? angular ? "frameangvel" : "framelinvel"
+          : angular ? "framequat"
+                    : "framepos",
+          m->body[body].name, velocity || term->target ? "" : " relative=\"goal\"", m->body[body].name);
+  return 1;
+}
+
 /// Of a posture that puts a free body farther than motions go.
 static int tell_far_root(FILE *out, const cav_problem *p, const double *q, const char *which) {
   for (int j = 0; j < p->model->njoint; j++) {
@@ -331,7 +361,8 @@ int cav_command_tell_units(FILE *out, const cav_problem *p) {
     n += tell_far_root(out, p, p->q_goal, "goal");
   for (int i = 0; i < p->nterm; i++) {
     const cav_term *term = &p->term[i];
-    n += tell_degrees(out, p, term) + tell_millimetres(out, p, term) + tell_touch(out, p, term);
+    n += tell_degrees(out, p, term) + tell_millimetres(out, p, term) + tell_touch(out, p, term) +
+         tell_things(out, p, term);
   }
   return n;
 }

@@ -215,8 +215,11 @@ int cav_command_tell_demands(FILE *out, const cav_problem *problem);
 /// Says of a <goal> that no term asks for where a term wants another reading at the end; their number. postures.c.
 int cav_command_tell_goal(FILE *out, const cav_problem *problem);
 
-/// Says of numbers that are likely to be of another unit (degrees, millimetres), and of a touch without a target; their
-/// number. asked.c.
+/// A number without the sign of a zero, and not in digits that are rounding. asked.c.
+double cav_command_plain(double x);
+
+/// Says of numbers that are likely to be of another unit (degrees, millimetres), of a touch without a target, and of roots of
+/// things that a term of roots counts; their number. asked.c.
 int cav_command_tell_units(FILE *out, const cav_problem *problem);
 
 /// Prints what terms with a target read at the start and at the goal, and what they want: a line each. asked.c.
@@ -238,8 +241,8 @@ int cav_command_floats(const cav_model *model, int root);
 /// The same, where an actuator moves its root, too, so that a motion of it is meant. postures.c.
 int cav_command_is_loose(const cav_model *model, int root);
 
-/// Says of terms that ask for one component in a body's principal axes that these are turned from its own; their
-/// number. axes.c.
+/// Says of terms that ask for a component, a direction or an orientation in a body's principal axes that these are turned
+/// from its own; their number. axes.c.
 int cav_command_tell_axes(FILE *out, const cav_problem *problem);
 
 /// Tells which solids of the world a motion leans on that neither its first nor its last knot touches, and that it never

@@ -189,7 +189,7 @@ static void print_geoms(const cav_model *m) {
     for (int k = 0; k < 3 && geom->size[k] != 0 && geom->type != CAV_GEOM_PLANE; k++) printf("%.4g ", geom->size[k]);
     printf("\n");
   }
-  if (!n) printf("no geom can touch another\n");
+  if (!n) printf("no geom can touch another, so nothing stands on the ground or on anything else\n");
   printf("\n");
 }
 
@@ -457,7 +457,7 @@ static void print_posture_bounds(const cav_problem *p, const cav_term *term) {
   const char *whose = term->target ? "its own posture" : "the goal";
   printf(", counted from %s", whose);
   if (!joint || joint->type > CAV_JOINT_HINGE || joint->type < CAV_JOINT_SLIDE || term->nwaypoint > 1) return;
-  const double from = (term->target ? term->target : p->q_goal)[joint->q];
+  const double from = cav_command_plain((term->target ? term->target : p->q_goal)[joint->q]);
   printf(" (%.4g): %.4g to %.4g %s", from, from + term->lower, from + term->upper,
          joint->type == CAV_JOINT_SLIDE ? "m" : "rad");
 }
@@ -483,7 +483,7 @@ static void print_target(const cav_problem *p, const cav_term *term) {
     int rotation = term->sensor.dim == 4, one = term->component >= 0 && !rotation;
     printf(" to");
     for (int i = one ? term->component : 0; i < (one ? term->component + 1 : term->sensor.dim); i++)
-      printf(" %.4g", term->target[i]);
+      printf(" %.4g", cav_command_plain(term->target[i]));
   } else if (term->quantity == CAV_QUANTITY_SENSOR) {
     printf(term->sensor.dim == 4 ? " to no rotation" : " to 0");
   }
@@ -528,16 +528,29 @@ static int runs(const cav_problem *p, const cav_term *term) {
          term->quantity != CAV_QUANTITY_TRACK && !slides;
 }
 
+enum { RUNNING = 160 };
+
+// "force of bar 100": such a cost by its name, or else by what it is of and whom it is for, and its weight
+static void write_running(const cav_problem *p, const cav_term *term, char text[RUNNING]) {
+  const char *quantity = cav_quantity_rule_of(term->quantity)->name, *whose = NULL;
+  const int named = *term->name && strcmp(term->name, quantity);
+  if (!named && term->body > 0) whose = p->model->body[term->body].name;
+  if (!named && cav_term_has_dofs(term))
+    whose = term->dofs == CAV_DOFS_ONE ? p->model->joint[term->joint].name : cav_problem_dof_sets[term->dofs];
+  if (!whose) whose = "";
+  snprintf(text, RUNNING, "%.60s%s%.60s %.4g", named ? term->name : quantity, *whose ? " of " : "", whose,
+           term->weight);
+}
+
 // costs over the motion by their weights, in one paragraph
 static void print_running(const cav_problem *p) {
   enum { WIDTH = 110 };
   int n = 0, used = 0;
   for (int i = 0; i < p->nterm; i++) {
     const cav_term *term = &p->term[i];
-    char text[100];
+    char text[RUNNING];
     if (!runs(p, term)) continue;
-    snprintf(text, sizeof text, "%.60s %.4g", *term->name ? term->name : cav_quantity_rule_of(term->quantity)->name,
-             term->weight);
+    write_running(p, term, text);
     if (!n++)
       used = printf("  running costs by weight: ");
     else
@@ -693,6 +706,7 @@ static cav_status print_problem(const cav_problem *p, int all, cav_error *error)
          p->limit_margin);
   print_terms(p, 0, all);
   if (!all) print_running(p);
+  if (*cav_problem_replaced(p)) printf("  note: %s: state that again where it is wanted\n", cav_problem_replaced(p));
   print_terms(p, 1, all);
   status = cav_command_print_asked(p, error);
   if (!status && !all) printf("\n");

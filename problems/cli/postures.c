@@ -262,7 +262,7 @@ static int tell_fall(FILE *out, const cav_problem *p) {
   return n;
 }
 
-/// Whether actuators and contacts bear a posture at rest; tells what does not.
+/// Whether actuators and contacts bear a posture at rest; tells what does not. What nothing moves may fall from the start on.
 static int tell_weakness(FILE *out, const cav_problem *p, const char *name, const double *q, double from) {
   const cav_term held = {.name = name,
                          .quantity = CAV_QUANTITY_CONFIGURATION,
@@ -283,7 +283,14 @@ static int tell_weakness(FILE *out, const cav_problem *p, const char *name, cons
   if (cav_problem_impossible(&alone, found, 3, &n, &ignored) != CAV_OK) return 0;
   for (int i = 0; i < n; i++) {
     if (found[i].condition != CAV_CONDITION_STRENGTH) continue;
-    fprintf(out, "note: at rest, %s\n", found[i].what);
+    const cav_joint *joint = found[i].joint < 0 ? NULL : &p->model->joint[found[i].joint];
+    if (joint && from == 0 && !p->model->link[joint->link].driven)
+      fprintf(out,
+              "note: at the start nothing holds '%.60s', which no actuator moves: it begins to move along its joint "
+              "'%.48s', as is right of what is let go\n",
+              p->model->body[joint->body].name, joint->name);
+    else
+      fprintf(out, "note: at rest, %s\n", found[i].what);
     return 1;
   }
   return 0;

@@ -16,22 +16,32 @@ typedef struct penetration {
   int knot, pair;
 } penetration;
 
-static int is_of_plane(const cav_model *m, int pair) {
-  return m->geom[m->pair[pair].geom1].type == CAV_GEOM_PLANE || m->geom[m->pair[pair].geom2].type == CAV_GEOM_PLANE;
+/// What a contact is with: a plane, another solid of the world, another tree, or a link of the same tree or mechanism.
+enum { PLANE, SOLID, TREE, LINK, KINDS };
+
+static int kind_of(const cav_model *m, const cav_contact *c) {
+  const cav_pair *pair = &m->pair[c->pair];
+  if (m->geom[pair->geom1].type == CAV_GEOM_PLANE || m->geom[pair->geom2].type == CAV_GEOM_PLANE) return PLANE;
+  return c->link1 == 0 || c->link2 == 0 ? SOLID : pair->external ? TREE : LINK;
 }
 
-// solids: planes do not count
-static cav_status note_depth_in(const cav_model *m, cav_state *state, const double *q, int knot, int solids,
-                                penetration *p) {
+// the deepest contact of each kind
+static cav_status note_depths(const cav_model *m, cav_state *state, const double *q, int knot, penetration p[KINDS]) {
   cav_status status = cav_position(m, state, q);
-  for (int i = 0; i < state->ncontact && !status; i++)
-    if (-state->contact[i].dist > p->depth && !(solids && is_of_plane(m, state->contact[i].pair)))
-      *p = (penetration){-state->contact[i].dist, knot, state->contact[i].pair};
+  for (int i = 0; i < state->ncontact && !status; i++) {
+    const cav_contact *c = &state->contact[i];
+    penetration *of = &p[kind_of(m, c)];
+    if (-c->dist > of->depth) *of = (penetration){-c->dist, knot, c->pair};
+  }
   return status;
 }
 
 static cav_status note_depth(const cav_model *m, cav_state *state, const double *q, int knot, penetration *p) {
-  return note_depth_in(m, state, q, knot, 0, p);
+  penetration of[KINDS] = {{0}};
+  cav_status status = note_depths(m, state, q, knot, of);
+  for (int k = 0; k < KINDS; k++)
+    if (of[k].depth > p->depth) *p = of[k];
+  return status;
 }
 
 // "2.1 mm: 'a' in 'b'"
@@ -48,8 +58,16 @@ static void tell(const cav_model *m, const penetration *p, double timestep, int 
 
 void cav_command_tell_guess(FILE *out, const cav_problem *p, int whole) {
   static const double deep = 0.02; // m
+  // and what solve does there
+  static const char *const told[KINDS][2] = {
+      [SOLID] = {"the guess runs into a solid",
+                 "solve begins over or round it or, where this fails, looks for such a way,"},
+      [TREE] = {"bodies of the guess run into each other",
+                "solve begins so, and contacts that are soft at first part them;"},
+      [LINK] = {"links of the guess run into each other",
+                "solve begins so, and its first stages let links of one body through each other (self_stiffness);"}};
   cav_error ignored = {0};
-  penetration ends = {0}, waypoints = {0}, way = {0};
+  penetration ends = {0}, waypoints = {0}, way[KINDS] = {{0}};
   char text[200];
   if (!p->nguess_pose && !whole) return;
   cav_state *state = cav_state_new(p->model);
@@ -62,17 +80,16 @@ void cav_command_tell_guess(FILE *out, const cav_problem *p, int whole) {
     if (t < guess->nknot) status = note_depth(p->model, state, guess->q + (size_t)t * (size_t)guess->nq, t, &waypoints);
   }
   for (int t = 0; !status && t < guess->nknot && whole; t++)
-    status = note_depth_in(p->model, state, guess->q + (size_t)t * (size_t)guess->nq, t, 1, &way);
+    status = note_depths(p->model, state, guess->q + (size_t)t * (size_t)guess->nq, t, way);
+  int kind = SOLID;
+  while (kind < KINDS && !(way[kind].depth > fmax(deep, ends.depth))) kind++;
   if (!status && waypoints.depth > fmax(deep, ends.depth)) {
     tell(p->model, &waypoints, p->timestep, 1, text, sizeof text);
     fprintf(out, "note: a waypoint of the guess is inside something, %s; cavort view PROBLEM shows it\n", text);
-  } else if (!status && way.depth > fmax(deep, ends.depth)) {
-    tell(p->model, &way, p->timestep, 1, text, sizeof text);
-    fprintf(
-        out,
-        "note: the guess runs into a solid, %s (cavort view PROBLEM shows it): solve begins over or round it or, where "
-        "this fails, looks for such a way, or give <waypoint>s\n",
-        text);
+  } else if (!status && kind < KINDS) {
+    tell(p->model, &way[kind], p->timestep, 1, text, sizeof text);
+    fprintf(out, "note: %s, %s (cavort view PROBLEM shows it): %s or give <waypoint>s\n", told[kind][0], text,
+            told[kind][1]);
   }
   cav_trajectory_free(guess);
   cav_state_free(state);

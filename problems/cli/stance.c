@@ -1,7 +1,9 @@
 /// How a posture touches and is in things, in one line of inspect: its centre of mass, which bodies touch the world and where,
-/// and which geom is deepest in what. And the two geoms of a contact by their names, what stands behind what moves.
+/// which touch bodies of other trees, and which geom is deepest in what. And the two geoms of a contact by their names, what
+/// stands behind what moves.
 #include <math.h>
 #include <stdio.h>
+#include <string.h>
 
 #include "cavort/dynamics.h"
 #include "command.h"
@@ -33,7 +35,33 @@ static int body_of(const cav_model *m, const cav_contact *c) {
   return m->geom[m->geom[pair->geom1].link == 0 ? pair->geom2 : pair->geom1].body;
 }
 
-// ", touches the world with a, b in x 0..1, y 0..1"; where is that of what actuators move, things of the scene aside
+static const char *name_of(const cav_model *m, int body) {
+  return *m->body[body].name ? m->body[body].name : "(no name)";
+}
+
+// the bodies of two trees that touch by a contact, in the order of the model; 0: none do
+static int bodies_of(const cav_model *m, const cav_contact *c, int body[2]) {
+  const cav_pair *pair = &m->pair[c->pair];
+  const int one = m->geom[pair->geom1].body, other = m->geom[pair->geom2].body;
+  body[0] = one < other ? one : other, body[1] = one < other ? other : one;
+  return c->dist <= touching && c->link1 > 0 && c->link2 > 0 && pair->external;
+}
+
+// ", beam touches ball" of bodies of different trees; returns how many pairs there are
+static int print_pairs(const cav_model *m, const cav_state *state) {
+  int pairs = 0;
+  for (int i = 0; i < state->ncontact; i++) {
+    int body[2], other[2], before = 0;
+    if (!bodies_of(m, &state->contact[i], body)) continue;
+    for (int k = 0; k < i; k++) before |= bodies_of(m, &state->contact[k], other) && !memcmp(body, other, sizeof body);
+    if (!before && ++pairs <= NAMED) printf(", %.60s touches %.60s", name_of(m, body[0]), name_of(m, body[1]));
+  }
+  if (pairs > NAMED) printf(" and %d more", pairs - NAMED);
+  return pairs;
+}
+
+// ", touches the world with a, b in x 0..1, y 0..1"; where is that of what actuators move, things of the scene aside. And what
+// touches what else
 static void print_touch(const cav_model *m, const cav_state *state) {
   double low[2] = {INFINITY, INFINITY}, high[2] = {-INFINITY, -INFINITY};
   int bodies = 0, driven = 0, things = 0;
@@ -52,15 +80,13 @@ static void print_touch(const cav_model *m, const cav_state *state) {
     }
     for (int k = 0; k < i; k++) before |= body_of(m, &state->contact[k]) == body;
     if (before || ++bodies > NAMED) continue;
-    printf("%s%.60s", bodies == 1 ? ", touches the world with " : ", ",
-           *m->body[body].name ? m->body[body].name : "(no name)");
+    printf("%s%.60s", bodies == 1 ? ", touches the world with " : ", ", name_of(m, body));
   }
   if (bodies > NAMED) printf(" and %d more", bodies - NAMED);
   if (bodies)
     printf("%s in x %.3f..%.3f, y %.3f..%.3f", driven && things ? "; that of what actuators move" : "", low[0], high[0],
            low[1], high[1]);
-  else
-    printf(", touches nothing of the world");
+  if (!print_pairs(m, state) && !bodies) printf(", touches nothing of the world");
 }
 
 // the centre of mass of what actuators move, things of the scene aside; of all where they move nothing. The state is at a posture

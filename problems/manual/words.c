@@ -73,6 +73,19 @@ static const struct {
      "z is up; x and y are those of the model's file, of most robots x forwards and y left. One of them counts by\n"
      "  component=\"z\"",
      "component"},
+    {"principal|inertial|ximat|iquat",
+     "body= of a sensor is the frame at a body's centre of mass along its principal axes of inertia, which may be "
+     "turned\n"
+     "  from the body's own by any angle; xbody= is the body's frame in the model's file. cavort inspect PROBLEM notes "
+     "where\n"
+     "  that matters",
+     "xbody"},
+    {"root_angular|root_linear",
+     "of <posture>, <velocity> and <acceleration> dofs=\"root_linear\" and \"root_angular\" are the translations and\n"
+     "  rotations of all free joints, of loose things of the scene, too; of one body <sensor type=\"framequat\" "
+     "xbody=\"torso\"\n"
+     "  relative=\"goal\" .../>, framepos, framelinvel, frameangvel",
+     "dofs"},
     {"unit|units|metre|metres|meter|meters|radian|radians",
      "m, s, kg, N and rad; degrees in the attributes degrees, euler and rotation alone", NULL},
     {"floor|ground|plane|table|box|wall|object|objects|stairs|ball|terrain|environment",
@@ -124,6 +137,32 @@ static const struct {
      "  that actuators of the model move. What is fixed or hangs on a rope for good is an <equality> or a <tendon> of\n"
      "  the model's file",
      "contact"},
+    {"handle|knob|hook",
+     "a handle is a geom of the door, the drawer or the lid; a hand is brought to it by <sensor type=\"framepos\"\n"
+     "  body=\"right hand\" reftype=\"xbody\" refname=\"door\" target=\"0.6 0 0.1\" .../>, from=, to=. Nothing closes "
+     "about it:\n"
+     "  to pull, the hand has to press it from behind (help grasp)",
+     "jointpos"},
+    {"lock|locked|fix|fixed|rigid|stiff",
+     "a joint stays as the start has it by <constraint><posture joint=\"NAME\" qpos=\"0.3\"/></constraint>, without\n"
+     "  from= and to=, its number that of the start; for good, by a model without that joint. Two bodies are fixed to "
+     "each\n"
+     "  other by <equality> of the model's file",
+     "constraint"},
+    {"catch|catching|caught|intercept",
+     "what is caught comes by itself: its speed is part of qvel= of <start>, and <root joint=\"ball\" .../> of <goal> "
+     "or\n"
+     "  <sensor type=\"framepos\" body=\"ball\" .../> says where it is in the end. A hand is brought to it by framepos "
+     "with\n"
+     "  refname=\"ball\" at that time; contacts do not bounce by themselves, and nothing closes a hand (help grasp)",
+     "qvel"},
+    {"rolling|rolls|spin|spinning",
+     "a ball rolls by the friction of its contact, and rolling is no slip. A start that rolls to -x has qvel=\"... -1 "
+     "0 0\n"
+     "  0 -W 0\", W = speed over radius, about y. It rolls on without end, but for friction=\"1 0.005 0.01\" "
+     "condim=\"6\" of\n"
+     "  its geom (MJCF); what still rolls at the end asks for <horizon close=\"open\"/>",
+     "qvel"},
     {"hold|held|keep|stay|still|freeze|rest|pause",
      "a posture, place or angle is held by a term over a while: from=\"1\" to=\"2\" in place of at=; a whole motion\n"
      "  ends at rest unless <horizon close=\"open\"/> says that it need not; <guess type=\"hold\"/> begins with the\n"
@@ -136,6 +175,24 @@ static const struct {
      "terms"},
     {"cup|can|bottle|tool|block|crate|carton|payloads|load",
      "a thing is a <body> with a <freejoint> in <scene>: help move", NULL},
+    {"fast|faster|fastest|quick|slow|speed|minimum|minimal|shortest|least|soon",
+     "in the least time: <horizon duration=\"1.5\" range=\"0.8 2\" weight=\"1\"/>, where the solver finds the "
+     "duration. How fast a\n"
+     "  body or a joint is: framelinvel, jointvel. With the least force or motion: higher weights of <effort>, "
+     "<velocity>",
+     "horizon"},
+    {"stop|stopped|stopping|brake",
+     "a joint stops at the ends of its range, in the model's file; a motion is at rest at its end unless <horizon\n"
+     "  close=\"open\"/> says that it need not; Ctrl-C stops a solve, --seconds ends it with what it has, --resume "
+     "goes on",
+     "horizon"},
+    {"limit|saturation|maximum|max",
+     "limits of joints and actuators are those of the model's file, and plans keep inside them by <limits>; a limit "
+     "of\n"
+     "  anything else is a constraint with lower= or upper=, as <velocity joint=\"NAME\" lower=\"-2\" upper=\"2\"/> "
+     "in\n"
+     "  <constraint>",
+     "limits"},
     {"end|final|last|finish",
      "at=\"end\" of a term; <horizon duration=\"2\"/> says when that is, and close=\"open\" that nothing need rest "
      "then",
