@@ -114,7 +114,7 @@ not_said "joint velocity"
 # two joints, one of them left out; weight 0 of one has no other any more, either
 cat >arm.xml <<'TEXT'
 <mujoco><worldbody><body name="upper"><joint name="shoulder" axis="0 1 0"/><geom name="upper" size=".05"/><body name="fore" pos=".5 0 0">
-<joint name="elbow" axis="0 1 0"/><geom name="fore" size=".05"/></body></body></worldbody></mujoco>
+<joint name="elbow" axis="0 1 0"/><geom name="fore" size=".05"/></body></body></worldbody><actuator><motor joint="shoulder"/></actuator></mujoco>
 TEXT
 for cost in '<velocity joint="elbow" weight="1"/>' '<velocity joint="elbow" weight="0"/>'; do
   echo "<problem name='arm' model='arm.xml'><horizon duration='1'/><start/><cost>$cost</cost></problem>" >narrow.xml

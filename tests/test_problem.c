@@ -69,7 +69,7 @@ static void check_wheels(void) {
       "<body name='wheel'><joint name='wheel' axis='0 1 0'/><geom type='cylinder' size='.1 .02' euler='90 0 0'/></body>"
       "<body name='crank'><joint name='crank' axis='0 1 0'/><geom type='sphere' size='.05' pos='.1 0 0'/></body>"
       "<body name='arm'><joint name='arm' axis='0 1 0' limited='true' range='-90 90'/><geom type='sphere' "
-      "size='.05'/></body></body></worldbody></mujoco>");
+      "size='.05'/></body></body></worldbody><actuator><motor joint='arm'/></actuator></mujoco>");
   static const char *const cost[] = {"", "<cost><posture weight='.2'/></cost>"};
   for (int given = 0; given < 2; given++) {
     char text[400];

@@ -52,6 +52,7 @@ typedef struct search {
   const cav_shape *a, *b; ///< a is curved
   const cav_core *core;   ///< of b
   double size, meets;
+  double above; ///< what the distance is at most, by points that a search has found
   candidate best;
 } search;
 
@@ -439,15 +440,9 @@ static void keep(search *g, const feature *fa, const feature *fb, const double n
 // apart, gap + miss^2/(2 gap)
 static int is_proven_apart(const search *g) {
   double gap = g->best.separation.gap, miss = g->best.miss;
+  // the face of a mesh is even to its tolerance only, to which its distance has to be known from above, too
+  if (gap > 0 && g->best.separation.corners > 2 && miss < EVEN * g->size && gap > g->above - EVEN * g->size) return 1;
   return gap > 0 && miss < NEARLY_ACROSS * g->size && miss * miss < 2 * gap * LEAST_GAIN * g->size;
-}
-
-// whether what meets is a face of a mesh, which is even to its tolerance only: no points lie across from each other to less than
-// that, and the distance is known as well from above, by the points that a search has found
-static int is_even(const search *g, double found) {
-  const candidate *c = &g->best;
-  return c->separation.corners > 2 && c->separation.gap > 0 && c->miss < EVEN * g->size &&
-         c->separation.gap > found - EVEN * g->size;
 }
 
 // all pairs of features about a direction, again about the best of them until that is proven, or its gap falls short of
@@ -462,7 +457,8 @@ static int polish(search *g, const double start[3], double least) {
     scale3(back, -1, about);
     int na = features_along(g->a, about, g->meets, g->size, fa), nb = features_along(g->b, back, g->meets, g->size, fb);
     for (int i = 0; i < na; i++) {
-      for (int j = 0; j < nb; j++) {
+      // faces are the last of a list: where one meets, the corners and edges about it are its own
+      for (int j = nb - 1; j >= 0; j--) {
         if (solve(g, &fa[i], &fb[j], about, n)) keep(g, &fa[i], &fb[j], n);
         if (is_proven_apart(g)) return 1;
       }
@@ -551,6 +547,7 @@ int cav_separation_solve(const cav_shape *a, const cav_shape *b, double margin, 
   cav_core ca = cav_core_of(g.a), cb = cav_core_of(g.b);
   g.core = &cb;
   g.meets = MEETS;
+  g.above = INFINITY;
   double most = margin + ca.radius + cb.radius;
   if (!cav_shape_is_curved(g.a) && !hint) return cav_separation_find(&ca, &cb, g.size, most, out);
   // of many corners those near a rough direction are too many to try: first the exact one, then the few about it
@@ -567,7 +564,8 @@ int cav_separation_solve(const cav_shape *a, const cav_shape *b, double margin, 
     if (!again && !cav_separation_find(&ca, &cb, g.size, most, out)) return 0;
     if (many && out->gap > 0) {
       g.meets = FEW;
-      proven = polish(&g, out->n, 0) || is_even(&g, out->gap);
+      g.above = out->gap;
+      proven = polish(&g, out->n, 0);
       g.meets = MEETS;
     }
   }

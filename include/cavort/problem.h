@@ -204,7 +204,7 @@ typedef enum cav_dof_set {
   CAV_DOFS_ROOT_LINEAR,  ///< the three translations of free joints
   CAV_DOFS_ROOT_ANGULAR, ///< the three rotations of free joints
   CAV_DOFS_JOINTS,       ///< all but free joints
-  CAV_DOFS_DRIVEN,       ///< those of trees that something drives (cav_link.driven)
+  CAV_DOFS_DRIVEN,       ///< those of them in trees that an actuator moves (cav_link.driven)
   CAV_DOFS_ONE           ///< the dofs of one joint: term->object
 } cav_dof_set;
 
