@@ -152,6 +152,16 @@ asks "$models/humanoid.xml" "duration='3' timestep='.025'" "friction (0.8) canno
 <start key="stand" height="floor"/><goal key="stand" height="floor"><root pos="40 0 1"/></goal><cost><posture dofs="all" at="end" weight="900"/></cost>
 E2
 
+# a force of what is only seen
+cat >pad.xml <<'E2'
+<mujoco><worldbody><geom type="plane" size="1 1 1"/><body name="finger" pos="0 0 .2"><joint name="slide" type="slide" axis="0 0 1"/><geom size=".05"/>
+<body name="pad" pos="0 0 -.05"><geom size=".01" contype="0" conaffinity="0"/></body></body></worldbody><actuator><motor joint="slide"/></actuator></mujoco>
+E2
+asks pad.xml "duration='1' timestep='.02'" "'press' wants a touch of body 'pad' at 1 s, but nothing can touch it" <<'E2'
+<start/><cost><sensor name="press" type="touch" body="pad" target="8" within="3" at="end" weight="9"/></cost>
+E2
+grep -q "Ask it of body 'finger', on which it hangs" err || { failed=$((failed + 1)); echo "failed: the body that can touch is not told"; }
+
 # of several bounds of one thing the tightest, once
 once() {
   "$cavort" inspect "$1" >out 2>&1

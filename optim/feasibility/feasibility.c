@@ -60,14 +60,14 @@ static void keep_tightest(cav_examination *e) {
 
 static cav_status examine(cav_examination *e) {
   static cav_status (*const condition[])(cav_examination *) = {
-      cav_examine_contradictions, cav_examine_directions, cav_examine_distances, cav_examine_speeds,
-      cav_examine_solids,         cav_examine_enclosures, cav_examine_falls,     cav_examine_floats,
-      cav_examine_momentum,       cav_examine_strength,   cav_examine_holds,     cav_examine_hinge,
-      cav_examine_slides,         cav_examine_takeoff,    cav_examine_energy};
+      cav_examine_contradictions, cav_examine_directions, cav_examine_distances,  cav_examine_speeds,
+      cav_examine_touches,        cav_examine_solids,     cav_examine_enclosures, cav_examine_falls,
+      cav_examine_floats,         cav_examine_momentum,   cav_examine_strength,   cav_examine_holds,
+      cav_examine_hinge,          cav_examine_slides,     cav_examine_takeoff,    cav_examine_energy};
   cav_status status = cav_requirements_collect(e);
-  // those after the first six reckon with forces, which roots may have from nowhere
+  // those after the first seven reckon with forces, which roots may have from nowhere
   const cav_residual *residual = &e->problem->residual;
-  size_t n = residual->force > 0 || residual->torque > 0 ? 6 : sizeof condition / sizeof *condition;
+  size_t n = residual->force > 0 || residual->torque > 0 ? 7 : sizeof condition / sizeof *condition;
   for (size_t i = 0; i < n && !status && e->nfound < e->most; i++) status = condition[i](e);
   return status;
 }

@@ -134,6 +134,7 @@ cav_status cav_examine_contradictions(cav_examination *e); // contradiction.c
 cav_status cav_examine_distances(cav_examination *e);      // distance.c
 cav_status cav_examine_directions(cav_examination *e);     // direction.c
 cav_status cav_examine_solids(cav_examination *e);         // solid.c
+cav_status cav_examine_touches(cav_examination *e);        // touch.c
 cav_status cav_examine_enclosures(cav_examination *e);     // enclosure.c
 cav_status cav_examine_falls(cav_examination *e);          // fall.c
 cav_status cav_examine_floats(cav_examination *e);         // float.c
