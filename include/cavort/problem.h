@@ -489,7 +489,7 @@ CAV_API cav_status cav_problem_write(const char *path, const cav_problem *proble
   X(RANGE, "range", "a target outside the range of a joint")                                                       \
   X(DISTANCE, "distance", "targets farther apart, or nearer, than links and ranges of joints allow")               \
   X(SOLID, "solid", "a posture or a target inside a solid")                                                        \
-  X(TOUCH, "touch", "a force to be felt where nothing can touch")                                                  \
+  X(TOUCH, "touch", "a force asked of what nothing can touch")                                                  \
   X(MOMENTUM, "momentum", "no force from outside that could move the centre of mass so far")                       \
   X(STRENGTH, "strength", "a posture to be held that actuators and contacts cannot hold")                          \
   X(ENERGY, "energy", "more energy, or a faster motion, than actuators can give in the time")

@@ -1,5 +1,5 @@
-/// A force asked of a touch sensor at which nothing can press: no pair of geoms that may touch has one of its body's, as where the
-/// body has shapes that are only seen and those that touch are its parent's.
+/// A force asked of a touch sensor at which nothing can press: no pair of geoms that may touch has one of its body's, as
+/// where the body has shapes that are only seen and those that touch are its parent's.
 #include <math.h>
 #include <stdio.h>
 
@@ -7,7 +7,7 @@
 #include "feasibility.h"
 
 /// Whether a contact of some pair counts for a sensor: of a body none with its own tree.
-static int can_feel(const cav_model *m, const cav_sensor *sensor) {
+static int can_sense(const cav_model *m, const cav_sensor *sensor) {
   for (int i = 0; i < m->npair; i++) {
     const cav_pair *pair = &m->pair[i];
     if (!cav_touch_sees(m, sensor, pair->geom1) && !cav_touch_sees(m, sensor, pair->geom2)) continue;
@@ -17,7 +17,7 @@ static int can_feel(const cav_model *m, const cav_sensor *sensor) {
   return 0;
 }
 
-/// The nearest body, of those that a sensor's body hangs on, of which a touch can be felt; 0: none.
+/// The nearest body, of those that a sensor's body hangs on, of which touches can be sensed; 0: none.
 static int find_other(const cav_model *m, const cav_sensor *sensor) {
   cav_sensor other = *sensor;
   other.object_type = CAV_OBJECT_BODY;
@@ -26,7 +26,7 @@ static int find_other(const cav_model *m, const cav_sensor *sensor) {
                                                       : m->body[sensor->object].parent;
   for (; body > 0; body = m->body[body].parent) {
     other.object = body;
-    if (can_feel(m, &other)) return body;
+    if (can_sense(m, &other)) return body;
   }
   return 0;
 }
@@ -40,7 +40,7 @@ cav_status cav_examine_touches(cav_examination *e) {
     if (term->quantity != CAV_QUANTITY_SENSOR || term->sensor.type != CAV_SENSOR_TOUCH) continue;
     cav_requirement_window(e, term, &first, &last);
     if (!cav_requirement_interval(e, term, last, INFINITY, low, high) || !(low[0] > 0)) continue;
-    if (can_feel(m, &term->sensor)) continue;
+    if (can_sense(m, &term->sensor)) continue;
     const cav_requirement r = {.term = i, .knot = last};
     const int other = find_other(m, &term->sensor);
     char what[160], cure[160] = "Ask it of something that can touch: inspect --all lists geoms that can.";
