@@ -111,7 +111,7 @@ static double aside(const walker *w, int j) {
 }
 
 /// The swings of the hinges found; none where the model has none. Limbs that are images of each other swing in turn, and of a
-/// pair behind another one those that are across: a trot. A travel of 0 is a turn on the spot: limbs bend in turn.
+/// pair behind another one those that are across: a trot. A travel of 0 is a turn on the spot or a way aside: limbs bend in turn.
 static void find_gait(const walker *w, double travel, cav_strategy *strategy) {
   const cav_model *m = w->problem->model;
   int first = -1, pair = 0;
@@ -169,6 +169,18 @@ static void face(const walker *w, const double *posture, double travel[2]) {
   heading[2] = half[0] * q[2] + half[1] * q[1], heading[3] = half[0] * q[3] + half[1] * q[0];
 }
 
+/// The gait of a model that is its own mirror image along an axis; none of others. link [nlink]: work.
+static cav_status swing_in_turn(walker *w, int side, double travel, int *link, cav_strategy *strategy) {
+  cav_error unlike;
+  double asymmetry;
+  w->side = side;
+  cav_status status = cav_mirror_find(w->problem, side, w->image, link, &asymmetry, &unlike);
+  if (status != CAV_OK) return status == CAV_NO_MEMORY ? status : CAV_OK;
+  status = find_support(w);
+  if (status == CAV_OK) find_gait(w, travel, strategy);
+  return status;
+}
+
 cav_status cav_gait_find(const cav_problem *problem, cav_strategy *strategy, int *turns) {
   const cav_model *m = problem->model;
   double travel[2];
@@ -182,15 +194,9 @@ cav_status cav_gait_find(const cav_problem *problem, cav_strategy *strategy, int
   cav_status status = w.state && w.posture && w.image && w.carries && link ? CAV_OK : CAV_NO_MEMORY;
   if (status == CAV_OK) face(&w, *turns ? problem->q_start : problem->q_goal, travel);
   const int along = !*turns && fabs(travel[1]) > fabs(travel[0]);
-  w.side = !along;
-  // a model that is not its own mirror image has no gait of this kind
-  cav_error unlike;
-  double asymmetry;
-  cav_status mirrored =
-      status == CAV_OK ? cav_mirror_find(problem, w.side, w.image, link, &asymmetry, &unlike) : status;
-  if (mirrored == CAV_NO_MEMORY) status = mirrored;
-  if (mirrored == CAV_OK) status = find_support(&w);
-  if (mirrored == CAV_OK && status == CAV_OK) find_gait(&w, *turns ? 0 : travel[along], strategy);
+  if (status == CAV_OK) status = swing_in_turn(&w, !along, *turns ? 0 : travel[along], link, strategy);
+  // aside, where front and back are not alike: limbs bend in turn
+  if (status == CAV_OK && along && !strategy->nswing) status = swing_in_turn(&w, 1, 0, link, strategy);
   cav_state_free(w.state);
   free(w.posture), free(w.image), free(w.carries), free(link);
   return status;

@@ -395,12 +395,14 @@ static cav_status find_guesses(const cav_problem *problem, const cav_strategy *s
   return status;
 }
 
+static const char straight[] = "straight from start to goal";
+
 /// From the straight way and from the start held, where the stated guess is neither.
 static void add_plain(const cav_problem *problem, cav_strategy *strategy, int *n, const guesses *g) {
   // where the goal is the start, the way straight to it is the start held
   const int stays = !problem->cycle.on && is_back(problem), holds = problem->guess == CAV_GUESS_HOLD;
-  if ((g->decorated || holds || g->sinks || g->pivots || g->led) && (!stays || g->led))
-    add(strategy, n, &g->plain, "line", "straight from start to goal");
+  if ((g->decorated || holds || g->sinks || g->pivots) && !g->led && !stays)
+    add(strategy, n, &g->plain, "line", straight);
   cav_strategy still = g->plain;
   still.guess = CAV_GUESS_HOLD;
   const int held = !g->decorated && (holds || (stays && problem->guess == CAV_GUESS_INTERPOLATE && !g->reach.nreach));
@@ -479,6 +481,11 @@ cav_status cav_strategy_list(const cav_problem *problem, cav_strategy strategy[C
   if (status == CAV_OK) status = find_guesses(problem, &stated, strategy, &g);
   if (status == CAV_OK) status = add_pushed(problem, strategy, n, &stated, &g);
   if (status == CAV_OK && !cav_upright_held(problem)) status = add_upright(problem, strategy, n, &stated);
+  // before what else is begun with a hand
+  if (status == CAV_OK && g.led) {
+    g.plain.text = straight;
+    add_mended(strategy, n, &g.plain, "line");
+  }
   if (status == CAV_OK) status = add_posture(problem, strategy, n, &stated);
   if (status == CAV_OK) status = add_pumped(problem, strategy, n, &swings_up);
   // what simulates in no time sooner than others are solved
