@@ -60,6 +60,30 @@ static void check_defaults(void) {
   cav_problem_free(NULL);
 }
 
+// velocities of the start, joint by joint: what floats along and about the axes of the world, into qvel's own
+static void check_start_velocity(void) {
+  write_in(
+      "ball.xml",
+      "<mujoco><worldbody><body name='ball' pos='0 0 1'><freejoint name='ball'/><geom size='.1'/></body><body pos='1 0 "
+      "1'>"
+      "<joint name='turn' axis='0 1 0'/><geom size='.1' pos='0 0 .3'/></body><body pos='2 0 1'><joint name='swing' "
+      "type='ball'/><geom size='.1' pos='0 0 .3'/></body></worldbody></mujoco>");
+  static const char head[] = "<problem model='ball.xml'><horizon duration='1'/><start%s>%s</start></problem>";
+  static const char *const more[2] = {"", " qvel='9 9 9 9 9 9 7 0 0 0'"};
+  static const char *const inside[2] = {
+      "<root euler='0 90 0' linvel='1 2 3' angvel='0 0 5'/><joint name='turn' vel='-2'/>",
+      "<root linvel='1 2 3'/><joint name='turn' degrees='90'/>"};
+  static const double wanted[2][7] = {{1, 2, 3, -5, 0, 0, -2}, {1, 2, 3, 9, 9, 9, 7}};
+  for (int k = 0; k < 2; k++) {
+    char text[600];
+    snprintf(text, sizeof text, head, more[k], inside[k]);
+    cav_problem *p = load(text);
+    if (!CHECK(p != NULL)) continue;
+    for (int i = 0; i < 7; i++) CHECK_NEAR(p->v_start[i], wanted[k][i], 1e-14);
+    cav_problem_free(p);
+  }
+}
+
 /// The default posture holds no wheel at an angle: an unlimited hinge through the centre of mass of what it turns. It does hold
 /// other joints, and a wheel where the file says so.
 static void check_wheels(void) {
@@ -540,6 +564,7 @@ int main(void) {
   snprintf(csv_path, sizeof csv_path, "%s/motion.csv", folder);
   write_in("robot.urdf", turntable);
   check_defaults();
+  check_start_velocity();
   check_wheels();
   check_words();
   check_quantities();
@@ -553,7 +578,7 @@ int main(void) {
   check_constraints();
   check_round_trip();
   check_motions();
-  const char *made[] = {"copy.xml", "motion.csv", "cart.xml", "robot.urdf", "record.csv"};
+  const char *made[] = {"copy.xml", "motion.csv", "cart.xml", "robot.urdf", "record.csv", "ball.xml"};
   end_folder(made, sizeof made / sizeof *made);
   return check_result();
 }

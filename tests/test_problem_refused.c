@@ -165,6 +165,11 @@ static void check_broken_starts(void) {
   refuse_start("<start><joint name='kne' pos='1'/></start>", "did you mean 'knee'");
   refuse_start("<start><joint name='NE' pos='1'/></start>", "has no joint of that name, got 'NE'; it has knee");
   refuse_start("<start><joint name='knee'/></start>", "one of the attributes");
+  refuse_start("<start><root vel='1 0 0'/></start>", "attribute 'vel': not known here");
+  refuse("<problem name='p' model='leg.xml'>\n" SCENE
+         "<horizon duration='1'/>\n<start><joint name='crate' vel='1'/></start>\n</problem>",
+         7, "joint 'crate' has more than one velocity; use <root linvel='' angvel=''>");
+  refuse(HEAD "<goal><joint name='knee' pos='1' vel='1'/></goal>\n" TAIL, 4, "attribute 'vel': not known here");
   refuse_start("<start><joint name='knee' pos='0' degrees='0'/></start>", "one of the attributes");
   refuse_start("<start><joint name='x' degrees='10'/></start>", "slides");
   refuse_start("<start><joint name='knee' quat='1 0 0 0'/></start>", "pos");

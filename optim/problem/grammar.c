@@ -64,22 +64,31 @@ static const char *const parameters[CAV_PARAMETER_KINDS + 1] = {CAV_PARAMETERS(P
   (const cav_xml_element *const[]) { __VA_ARGS__, NULL }
 
 // postures
+#define ROOT_PLACE                                                                                                     \
+  TEXT("joint", "(the first free joint)", "free joint that is placed"),                                                \
+  REALS("pos", 3, 3, "m", "(as it was)", "position in the world"),                                                     \
+  REALS("quat", 4, 4, "", "(as it was)", "orientation as a quaternion w x y z, brought to unit length"),               \
+  REALS("euler", 3, 3, "degrees", "(as it was)", "orientation by rotations about x, then the new y, then the new z"),  \
+  WORD("height", heights, "floor", "keep: height=\"floor\" of the posture leaves it where it is, as a ball in the air")
+#define JOINT_PLACE(one)                                                                                               \
+  NEEDED("name", "joint that is set"), REALS("pos", 1, 1, "rad or m", one, "angle of a hinge, distance of a slide"),   \
+  REALS("degrees", 1, 1, "degrees", one, "angle of a hinge"),                                                          \
+  REALS("quat", 4, 4, "", one, "orientation of a ball joint, w x y z")
 static const cav_xml_element pose_root = {
+    "root", 0, 0, ATTRIBUTES(ROOT_PLACE), NULL, 0, "places a free joint: position and orientation of what floats"};
+static const cav_xml_element pose_joint = {
+    "joint", 0, 0, ATTRIBUTES(JOINT_PLACE("(give exactly one of pos, degrees, quat)")), NULL, 0, "sets one joint"};
+static const cav_xml_element start_root = {
     "root", 0, 0,
     ATTRIBUTES(
-        TEXT("joint", "(the first free joint)", "free joint that is placed"),
-        REALS("pos", 3, 3, "m", "(as it was)", "position in the world"),
-        REALS("quat", 4, 4, "", "(as it was)", "orientation as a quaternion w x y z, brought to unit length"),
-        REALS("euler", 3, 3, "degrees", "(as it was)", "orientation by rotations about x, then the new y, then the new z"),
-        WORD("height", heights, "floor", "keep: height=\"floor\" of the posture leaves it where it is, as a ball in the air")),
-    NULL, 0, "places a free joint: position and orientation of what floats"};
-static const cav_xml_element pose_joint = {
+        ROOT_PLACE, REALS("linvel", 3, 3, "m/s", "(0 0 0)", "velocity at the start, along the axes of the world"),
+        REALS("angvel", 3, 3, "rad/s", "(0 0 0)", "angular velocity at the start, about the axes of the world")),
+    NULL, 0, "places a free joint, and says how it moves: position, orientation and velocity of what floats"};
+static const cav_xml_element start_joint = {
     "joint", 0, 0,
     ATTRIBUTES(
-        NEEDED("name", "joint that is set"),
-        REALS("pos", 1, 1, "rad or m", "(give exactly one of pos, degrees, quat)", "angle of a hinge, distance of a slide"),
-        REALS("degrees", 1, 1, "degrees", "(give exactly one of pos, degrees, quat)", "angle of a hinge"),
-        REALS("quat", 4, 4, "", "(give exactly one of pos, degrees, quat)", "orientation of a ball joint, w x y z")),
+        JOINT_PLACE("(give one of pos, degrees, quat, or vel alone)"),
+        REALS("vel", 1, 1, "rad/s or m/s", "(0)", "velocity of a hinge or a slide at the start")),
     NULL, 0, "sets one joint"};
 #define POSE_SOURCE                                                                                                    \
   TEXT("key", "(the model's own configuration)", "keyframe of the model or else <pose> of this file to begin with; \"stand\", \"kneel\", \"sit\", \"lie-back\" and more are found of any humanoid (help postures)"), \
@@ -95,7 +104,7 @@ static const cav_xml_element start = {
         POSE_SOURCE, REALS("qvel", 1, 0, "rad/s or m/s", "(zeros)", "velocity at the start (of the step that leads to it): a number a dof, in the order of the joints of the model and then of the <scene> (inspect --all lists them); a free joint has 3 in m/s along the world's axes and then 3 in rad/s about its body's own, a ball joint 3 in rad/s about its own"),
         WORD("velocity", rates, "rest", "file: the velocity at that knot of the file is the start's, too"),
         FLAG("free", "false", "posture and velocity at the start are found too: what stands here is where the guess starts")),
-    CHILDREN(&pose_root, &pose_joint), 0, "posture and velocity that the motion begins with"};
+    CHILDREN(&start_root, &start_joint), 0, "posture and velocity that the motion begins with"};
 static const cav_xml_element goal = {
     "goal", 0, 1, ATTRIBUTES(POSE_SOURCE), CHILDREN(&pose_root, &pose_joint), 0,
     "posture that the guess leads to and that <posture> terms have as their target; without it the start"};

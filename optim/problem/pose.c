@@ -261,11 +261,46 @@ static cav_status lay_root(const cav_problem_reader *reader, const cav_xml_node 
   return CAV_OK;
 }
 
+// velocity of a free joint; its last three numbers are about its body's own axes
+static cav_status move_root(const cav_problem_reader *reader, const cav_xml_node *node, const double *q, double *v) {
+  int j = root_joint(reader, node);
+  if (j < 0) return CAV_BAD_INPUT;
+  const cav_joint *joint = &reader->model->joint[j];
+  double turn[3], back[4];
+  cav_xml_reals(node, "linvel", v + joint->dof, 3);
+  if (!cav_xml_reals(node, "angvel", turn, 3)) return CAV_OK;
+  quat_conjugate(back, q + joint->q + 3);
+  quat_rotate(v + joint->dof + 3, back, turn);
+  return CAV_OK;
+}
+
+static cav_status move_joint(const cav_problem_reader *reader, const cav_xml_node *node, double *v) {
+  if (!cav_xml_get(node, "vel")) return CAV_OK;
+  int j = cav_problem_find(reader, node, "name", CAV_OBJECT_JOINT);
+  if (j < 0) return CAV_BAD_INPUT;
+  const cav_joint *joint = &reader->model->joint[j];
+  if (joint->type != CAV_JOINT_HINGE && joint->type != CAV_JOINT_SLIDE)
+    return cav_xml_fail(reader->error, node, "vel", "joint '%s' has more than one velocity; %s", joint->name,
+                        joint->type == CAV_JOINT_FREE ? "use <root linvel='' angvel=''>" : "use 'qvel' of <start>");
+  v[joint->dof] = cav_xml_real(node, "vel", 0);
+  return CAV_OK;
+}
+
+cav_status cav_problem_pose_moves(const cav_problem_reader *reader, const cav_xml_node *node, const double *q,
+                                  double *v) {
+  cav_status status = CAV_OK;
+  const cav_xml_node *root = cav_problem_child(node, "root"), *joint = cav_problem_child(node, "joint");
+  for (; root && !status; root = cav_xml_next(root)) status = move_root(reader, root, q, v);
+  for (; joint && !status; joint = cav_xml_next(joint)) status = move_joint(reader, joint, v);
+  return status;
+}
+
 static cav_status lay_joint(const cav_problem_reader *reader, const cav_xml_node *node, double *q) {
   int j = cav_problem_find(reader, node, "name", CAV_OBJECT_JOINT);
   if (j < 0) return CAV_BAD_INPUT;
   const cav_joint *joint = &reader->model->joint[j];
   int given = !!cav_xml_get(node, "pos") + !!cav_xml_get(node, "degrees") + !!cav_xml_get(node, "quat");
+  if (!given && cav_xml_get(node, "vel")) return CAV_OK;
   if (given != 1)
     return cav_xml_fail(reader->error, node, NULL, "expected one of the attributes pos, degrees, quat, got %d", given);
   const char *wanted = joint->type == CAV_JOINT_BALL ? "quat" : "pos";

@@ -424,6 +424,7 @@ static cav_status read_ends(const cav_problem_reader *reader) {
     status = cav_problem_pose_velocity(reader, start, p->v_start);
     if (status) return status;
   }
+  if ((status = cav_problem_pose_moves(reader, start, p->q_start, p->v_start))) return status;
   if (!goal) {
     memcpy(p->q_goal, p->q_start, (size_t)m->nq * sizeof(double));
     return CAV_OK;

@@ -90,6 +90,10 @@ int cav_problem_in_degrees(const cav_problem_reader *reader, const cav_xml_node 
 /// Velocity v [nv] at the knot that a node takes its posture from. pose.c.
 cav_status cav_problem_pose_velocity(const cav_problem_reader *reader, const cav_xml_node *node, double *v);
 
+/// What the <root> and <joint> of <start> say of velocities, into v [nv]; q [nq]: the posture that it has. pose.c.
+cav_status cav_problem_pose_moves(const cav_problem_reader *reader, const cav_xml_node *node, const double *q,
+                                  double *v);
+
 /// Configuration of the keyframe or <pose> that attribute 'key' of node names.
 cav_status cav_problem_key(const cav_problem_reader *reader, const cav_xml_node *node, double *q);
 

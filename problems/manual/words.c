@@ -150,19 +150,20 @@ static const struct {
      "  other by <equality> of the model's file",
      "constraint"},
     {"catch|catching|caught|intercept",
-     "what is caught comes by itself: its speed is part of qvel= of <start>, and <root joint=\"ball\" .../> of <goal> "
-     "or\n"
+     "what is caught comes by itself: <root joint=\"ball\" linvel=\"-1 0 0\"/> of <start>; <root joint=\"ball\" .../> "
+     "of "
+     "<goal> or\n"
      "  <sensor type=\"framepos\" body=\"ball\" .../> says where it is in the end. A hand is brought to it by framepos "
      "with\n"
      "  refname=\"ball\" at that time; contacts do not bounce by themselves, and nothing closes a hand (help grasp)",
      "qvel"},
     {"rolling|rolls|spin|spinning",
-     "a ball rolls by the friction of its contact, and rolling is no slip. A start that rolls to -x has qvel=\"... -1 "
-     "0 0\n"
-     "  0 -W 0\", W = speed over radius, about y. It rolls on without end, but for friction=\"1 0.005 0.01\" "
+     "a ball rolls by the friction of its contact, and rolling is no slip. A start that rolls to -x has, in <start>,\n"
+     "  <root joint=\"ball\" linvel=\"-1 0 0\" angvel=\"0 -W 0\"/>, W = speed over radius, about y. It rolls on "
+     "without end, but for friction=\"1 0.005 0.01\" "
      "condim=\"6\" of\n"
      "  its geom (MJCF); what still rolls at the end asks for <horizon close=\"open\"/>",
-     "qvel"},
+     "linvel"},
     {"hold|held|keep|stay|still|freeze|rest|pause",
      "a posture, place or angle is held by a term over a while: from=\"1\" to=\"2\" in place of at=; a whole motion\n"
      "  ends at rest unless <horizon close=\"open\"/> says that it need not; <guess type=\"hold\"/> begins with the\n"
