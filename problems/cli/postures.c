@@ -252,8 +252,9 @@ static int tell_fall(FILE *out, const cav_problem *p) {
     if (lowered && height <= clear) continue;
     fprintf(out, "note: at the start '%.60s' touches nothing and is at rest", *name ? name : "body");
     if (lowered) fprintf(out, ", %.3g m above what is below it: it falls", height);
-    fprintf(out,
-            lowered ? ". To stand, <start height='floor'>; of a flight, linvel= of its <root> says how fast it goes\n" : ": it falls\n");
+    fprintf(out, lowered
+                     ? ". To stand, <start height='floor'>; of a flight, linvel= of its <root> says how fast it goes\n"
+                     : ": it falls\n");
     n++;
   }
   cav_state_free(low);
