@@ -96,7 +96,7 @@ check "order, axes and units of qvel" says qvel "in the order of the joints of t
 for word in velocity posture acceleration; do
   check "$word of one joint replaces the defaults" says "$word" "a cost of it over the whole motion takes the place of the default costs of its kind, which are of all joints"
 done
-check "roots are those of things, too" says dofs "of things of the scene, too: joints are all but free joints, root_linear and root_angular"
+check "roots are those of things, too" says dofs "of things of the scene, too: joints are all but free joints, driven those of them in trees that an actuator moves, root_linear and root_angular"
 check "what begins inside a solid is not stopped by it" says rise "what stands in the way down stops it, unless it begins inside that"
 check "principal axes of a body" says body "along its principal axes of inertia, which may be turned from its own"
 check "who has a tolerance" says within "attribute within of <sensor> <posture> <velocity> <acceleration> <effort> <power>"

@@ -672,6 +672,34 @@ static void test_under(void) {
   }
 }
 
+// standing before a beam at the height of the chest the guess ducks: deep enough, and back up
+static void test_duck(void) {
+  cav_error error = {0};
+  cav_problem *p = cav_problem_load(CAVORT_SOURCE_ROOT "/tests/unseen/duck.xml", NULL, &error);
+  if (!CHECK(p != NULL)) return;
+  p->schedule.solids = CAV_SOLIDS_GROW;
+  cav_trajectory *way = cav_problem_guess(p, &error);
+  cav_state *state = cav_state_new(p->model);
+  if (CHECK(way != NULL)) {
+    double least = INFINITY, most = 0, in = 0;
+    for (int t = 0; t < way->nknot; t++) {
+      const double *q = way->q + (size_t)t * (size_t)way->nq;
+      least = fmin(least, q[2]), most = fmax(most, q[2]);
+      CHECK(cav_position(p->model, state, q) == CAV_OK);
+      for (int i = 0; i < state->ncontact; i++) {
+        const cav_contact *c = &state->contact[i];
+        const int beam = p->model->geom[p->model->pair[c->pair].geom1].type == CAV_GEOM_CAPSULE;
+        if (beam && (c->link1 == 0 || c->link2 == 0)) in = fmax(in, -c->dist);
+      }
+    }
+    CHECK(least < p->q_start[2] - 0.3 && most < p->q_start[2] + 0.01 && in < 0.002);
+    CHECK_NEAR(way->q[(size_t)(way->nknot - 1) * (size_t)way->nq + 2], p->q_start[2], 0.01);
+  }
+  cav_state_free(state);
+  cav_trajectory_free(way);
+  cav_problem_free(p);
+}
+
 // a file without a goal whose hand is wanted behind a wall is begun by a posture that has it there, round the wall, clear of
 // all; nothing of that where the straight way there is free, or the start's posture is asked for at the end too
 static void test_reach(void) {
@@ -779,7 +807,7 @@ static void test_borne(void) {
       const double *end = at->q + (size_t)(at->nknot - 1) * (size_t)at->nq;
       CHECK(cav_verify_solution(p, solution, &v, &error) == CAV_OK && v.certified && v.achieved);
       // it rolls: spin is the way over the radius but for what beam and ball slip, and a tilt of a twentieth does that
-      CHECK(fabs(0.05 * end[3] - (end[1] + 0.4)) < 0.01 && solution->cost < 0.05);
+      CHECK(fabs(0.05 * end[3] - (end[1] + 0.4)) < 0.01 && solution->cost < 0.1);
     }
     cav_solution_free(solution);
     cav_strategies_clear(strategy, n);
@@ -846,6 +874,7 @@ int main(void) {
   test_detour();
   test_bypass();
   test_under();
+  test_duck();
   test_reach();
   test_aside();
   test_borne();

@@ -161,8 +161,8 @@ cav_status cav_problem_table(const cav_problem_reader *reader, const cav_xml_nod
 /// Whether a term over dofs selects dof d. term.c.
 int cav_problem_selects(const cav_model *model, const cav_term *term, int d);
 
-/// Whether a joint is a wheel: an unlimited hinge through the centre of mass of what it turns, that carries nothing. No
-/// angle of it is a posture. term.c.
+/// Whether a joint is a wheel: an unlimited hinge through the centre of mass of what it turns, that carries nothing and, where it
+/// slides, too, is a ball. No angle of it is a posture. term.c.
 int cav_problem_is_wheel(const cav_model *model, int joint);
 
 /// Fills error with "no memory"; returns CAV_NO_MEMORY.

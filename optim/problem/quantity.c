@@ -70,11 +70,11 @@ cav_term cav_term_range(cav_quantity quantity, double lower, double upper) {
 
 static const cav_term default_term[] = {
     {.name = "effort", .quantity = CAV_QUANTITY_EFFORT, .weight = 1},
-    {.name = "joint velocity", .quantity = CAV_QUANTITY_VELOCITY, .dofs = CAV_DOFS_DRIVEN, .weight = 0.05},
+    {.name = "joint velocity", .quantity = CAV_QUANTITY_VELOCITY, .dofs = CAV_DOFS_JOINTS, .weight = 0.05},
     {.name = "root turning", .quantity = CAV_QUANTITY_VELOCITY, .dofs = CAV_DOFS_ROOT_ANGULAR, .weight = 0.05},
     {.name = "acceleration", .quantity = CAV_QUANTITY_ACCELERATION, .dofs = CAV_DOFS_ALL, .weight = 1e-4},
     {.name = "root acceleration", .quantity = CAV_QUANTITY_ACCELERATION, .dofs = CAV_DOFS_ROOT_LINEAR, .weight = 0.02},
-    {.name = "posture", .quantity = CAV_QUANTITY_CONFIGURATION, .dofs = CAV_DOFS_DRIVEN, .weight = 0.1},
+    {.name = "posture", .quantity = CAV_QUANTITY_CONFIGURATION, .dofs = CAV_DOFS_JOINTS, .weight = 0.1},
     {.name = "gap", .quantity = CAV_QUANTITY_GAP, .weight = 1000},
     {.name = "slip", .quantity = CAV_QUANTITY_SLIP, .weight = 200},
     {.name = "impact", .quantity = CAV_QUANTITY_IMPACT, .weight = 10},

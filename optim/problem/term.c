@@ -636,11 +636,22 @@ int cav_term_counts(const cav_term *term) {
   return term->weight > 0 || term->use != CAV_USE_COST || (term->quantity == CAV_QUANTITY_SLIP && term->within > 0);
 }
 
+/// Whether all that a link touches with is one sphere.
+static int is_ball(const cav_model *m, int link) {
+  int spheres = 0, others = 0;
+  for (int g = 0; g < m->ngeom; g++)
+    if (m->geom[g].link == link && (m->geom[g].contype || m->geom[g].conaffinity))
+      *(m->geom[g].type == CAV_GEOM_SPHERE ? &spheres : &others) += 1;
+  return spheres == 1 && !others;
+}
+
 int cav_problem_is_wheel(const cav_model *m, int j) {
   const cav_joint *joint = &m->joint[j];
   const cav_link *link = &m->link[joint->link];
   double arm[3], off[3];
-  if (joint->type != CAV_JOINT_HINGE || joint->limited || joint->stiffness != 0 || link->njoint != 1) return 0;
+  if (joint->type != CAV_JOINT_HINGE || joint->limited || joint->stiffness != 0) return 0;
+  // what slides, too, rolls if it is a ball
+  if (link->njoint != 1 && (j != link->joint + link->njoint - 1 || !is_ball(m, joint->link))) return 0;
   for (int i = joint->link + 1; i < m->nlink; i++)
     if (m->link[i].parent == joint->link) return 0;
   sub3(arm, link->com, joint->pos);

@@ -1,6 +1,7 @@
 /// Guesses lifted out of what stands in the world: where the line from start to goal goes through a solid there is no way
 /// to the outside that a solver could follow. At each knot the least lift straight up that frees the model; then so smooth a
-/// course above these that no step is taken in less than half a second. What is a little in what hangs over it stays below.
+/// course above these that no step is taken in less than half a second. Where all of a way through what hangs is shorter below
+/// it, so deep that it is clear: limbs that reach the ground then are folded by it.
 #include "clear.h"
 
 #include <math.h>
@@ -26,9 +27,9 @@ static const double deep = 0.01;
 /// Depth in the ground of a guess that goes through it, over the size of the model.
 static const double buried = 0.5;
 
-/// How far a guess that is under what hangs has to go down to be clear of it, over how far up, and at most, m; how high the foot
-/// of what hangs is over the lowest point of the start, m.
-static const double under = 0.25, under_most = 0.1, hanging = 0.05;
+/// How far a guess goes down at most below what hangs, over the height of its root; how high the foot of what hangs is over the
+/// lowest point of the start, m; what is met within so many s is passed on one side.
+static const double crouch = 0.45, hanging = 0.05, together = 1;
 
 /// Time over which the course looks ahead and back, s.
 static const double ahead = 0.25;
@@ -60,14 +61,19 @@ int cav_is_with_solid(const cav_model *m, const cav_contact *c) {
   return type != CAV_GEOM_PLANE && type != CAV_GEOM_HFIELD;
 }
 
-/// How deep the model is in the world at a configuration: in all of it, or in solids alone.
+/// How deep the model is in the world where a state is: in all of it, or in solids alone.
+static double depth_in(const cav_model *m, const cav_state *state, int solids) {
+  double depth = 0;
+  for (int i = 0; i < state->ncontact; i++) {
+    const cav_contact *c = &state->contact[i];
+    if (solids ? cav_is_with_solid(m, c) : c->link1 == 0 || c->link2 == 0) depth = fmax(depth, -c->dist);
+  }
+  return depth;
+}
+
 static cav_status depth_at(const cav_model *m, cav_state *state, const double *q, int solids, double *depth) {
   cav_status status = cav_position(m, state, q);
-  *depth = 0;
-  for (int i = 0; i < state->ncontact && !status; i++) {
-    const cav_contact *c = &state->contact[i];
-    if (solids ? cav_is_with_solid(m, c) : c->link1 == 0 || c->link2 == 0) *depth = fmax(*depth, -c->dist);
-  }
+  *depth = status ? 0 : depth_in(m, state, solids);
   return status;
 }
 
@@ -97,66 +103,113 @@ static cav_status is_hung_over(const cav_model *m, cav_state *state, const doubl
   *hung = 1;
   for (int i = 0; i < state->ncontact && !status; i++) {
     const cav_contact *c = &state->contact[i];
-    if (c->dist >= -touching || !(c->link1 == 0 || c->link2 == 0)) continue;
+    if (c->dist >= -touching || !cav_is_with_solid(m, c)) continue;
     const int g = c->link1 == 0 ? m->pair[c->pair].geom1 : m->pair[c->pair].geom2;
     cav_pose pose;
     cav_object_pose(m, state, CAV_OBJECT_GEOM, g, &pose);
-    const double foot = pose.pos[2] - cav_geom_reach(&m->geom[g], &pose, down);
-    *hung &= cav_is_with_solid(m, c) && foot > lowest + hanging;
+    *hung &= pose.pos[2] - cav_geom_reach(&m->geom[g], &pose, down) > lowest + hanging;
   }
   return status;
 }
 
-/// Whether a model that a lift frees of solids is under what it is in, and would be free a little lower.
-static cav_status is_under(const cav_model *m, cav_state *state, double *q, double lowest, double up, int *is) {
-  double depth = 1, down = 0;
-  const double most = fmin(under * up, under_most);
-  cav_status status = is_hung_over(m, state, q, lowest, is);
-  while (!status && *is && depth > touching && down < most) {
-    cav_lift(m, -step, q), down += step;
+/// How far a model that is in solids has to go down to be clear of them, up to most; infinite: that is no way.
+static cav_status find_way_below(const cav_model *m, cav_state *state, double *q, double lowest, double most,
+                                 double *down) {
+  double way = 0;
+  int hung;
+  cav_status status = is_hung_over(m, state, q, lowest, &hung);
+  double depth = status ? 0 : depth_in(m, state, 1);
+  while (!status && hung && depth > touching && way < most) {
+    cav_lift(m, -step, q), way += step;
     status = depth_at(m, state, q, 1, &depth);
   }
-  cav_lift(m, down, q);
-  *is = *is && depth <= touching;
+  cav_lift(m, way, q);
+  *down = hung && depth <= touching ? way : INFINITY;
   return status;
 }
 
-cav_status cav_clear(const cav_model *m, cav_trajectory *at) {
-  int n = at->nknot, w = (int)ceil(ahead / at->timestep);
-  cav_state *state = cav_state_new(m);
-  double *room = calloc(3 * (size_t)n + (size_t)at->nq, sizeof *room), *lift = room, *wide = room + n,
-         *course = room + 2 * n, *before = room + 3 * n;
-  cav_status status = state && room ? cav_position(m, state, at->q) : CAV_NO_MEMORY;
+/// Ways out of the world of the knots of a guess: straight up; down, below solids, where it is in them or comes there on the way
+/// up, else negative; and a smooth course.
+typedef struct ways {
+  int n, window;
+  double *up, *down, *wide, *course; ///< [n]
+} ways;
+
+/// The least lift of each knot, which it gets, and its way down.
+static cav_status find_ways(const cav_model *m, cav_state *state, cav_trajectory *at, double *before, ways *w) {
+  cav_status status = cav_position(m, state, at->q);
   const double lowest = status ? 0 : cav_lowest_point(m, state, 0);
-  for (int t = 1; t < n && !status; t++) {
+  const double most = status ? 0 : crouch * (state->com[3 * (m->nlink > 1) + 2] - lowest);
+  for (int t = 1; t < w->n && !status; t++) {
     double *q = at->q + (size_t)t * at->nq, depth = 1;
+    int met = 0;
     memcpy(before, q, (size_t)at->nq * sizeof *q);
+    w->down[t] = -1;
     for (int k = 0; k < STEPS && !status; k++) {
       status = depth_at(m, state, q, 0, &depth);
+      met |= depth_in(m, state, 1) > touching;
       if (depth <= touching) break;
       double up = fmax(depth, step);
       cav_lift(m, up, q);
-      lift[t] += up;
+      w->up[t] += up;
     }
-    int stays = 0;
-    if (lift[t] > 0 && !status) status = is_under(m, state, before, lowest, lift[t], &stays);
-    if (!stays) continue;
-    cav_lift(m, -lift[t], q);
-    lift[t] = 0;
+    if (met && !status) status = find_way_below(m, state, before, lowest, most, &w->down[t]);
   }
-  for (int t = 0; t < n && !status; t++)
-    for (int k = -w; k <= w; k++)
-      if (t + k >= 0 && t + k < n) wide[t] = fmax(wide[t], lift[t + k]);
-  for (int t = 1; t < n && !status; t++) {
-    double sum = 0, weights = 0;
-    for (int k = -w; k <= w; k++) {
-      double weight = 1 + cos(M_PI * k / (w + 1));
-      weights += weight;
-      if (t + k >= 0) sum += weight * wide[t + k < n ? t + k : n - 1];
+  return status;
+}
+
+/// Takes knots that are in solids one soon after the other below these, where that is shorter for all of them.
+static void go_below(const cav_model *m, cav_trajectory *at, ways *w) {
+  const int soon = (int)ceil(together / at->timestep);
+  for (int first = 1, last; first < w->n; first = last + 1) {
+    double up = 0, down = 0;
+    last = first;
+    if (w->down[first] < 0) continue;
+    for (int t = first; t < w->n && t <= last + soon; t++) {
+      up = fmax(up, w->up[t]), down = fmax(down, w->down[t]);
+      if (w->down[t] >= 0) last = t;
     }
-    course[t] = sum / weights;
-    double rest = t < n - 1 ? fmax(course[t] - lift[t], 0) : 0;
-    cav_lift(m, rest, at->q + (size_t)t * at->nq);
+    for (int t = first; t <= last; t++) {
+      if (down <= up) {
+        cav_lift(m, -w->up[t] - fmax(w->down[t], 0), at->q + (size_t)t * at->nq);
+        w->up[t] = 0;
+      } else {
+        w->down[t] = 0;
+      }
+    }
+  }
+  for (int t = 0; t < w->n; t++) w->down[t] = fmax(w->down[t], 0);
+}
+
+/// Lifts each knot, or lowers it, from the least that it got to a smooth course.
+static void follow_course(const cav_model *m, cav_trajectory *at, const ways *w, const double *least, double sign) {
+  memset(w->wide, 0, (size_t)w->n * sizeof *w->wide);
+  for (int t = 0; t < w->n; t++)
+    for (int k = -w->window; k <= w->window; k++)
+      if (t + k >= 0 && t + k < w->n) w->wide[t] = fmax(w->wide[t], least[t + k]);
+  for (int t = 1; t < w->n; t++) {
+    double sum = 0, weights = 0;
+    for (int k = -w->window; k <= w->window; k++) {
+      double weight = 1 + cos(M_PI * k / (w->window + 1));
+      weights += weight;
+      if (t + k >= 0) sum += weight * w->wide[t + k < w->n ? t + k : w->n - 1];
+    }
+    w->course[t] = sum / weights;
+    double rest = t < w->n - 1 ? fmax(w->course[t] - least[t], 0) : 0;
+    cav_lift(m, sign * rest, at->q + (size_t)t * at->nq);
+  }
+}
+
+cav_status cav_clear(const cav_model *m, cav_trajectory *at) {
+  const size_t n = (size_t)at->nknot;
+  cav_state *state = cav_state_new(m);
+  double *room = calloc(4 * n + (size_t)at->nq, sizeof *room);
+  ways w = {at->nknot, (int)ceil(ahead / at->timestep), room, room + n, room + 2 * n, room + 3 * n};
+  cav_status status = state && room ? find_ways(m, state, at, room + 4 * n, &w) : CAV_NO_MEMORY;
+  if (!status) {
+    go_below(m, at, &w);
+    follow_course(m, at, &w, w.up, 1);
+    follow_course(m, at, &w, w.down, -1);
   }
   cav_state_free(state);
   free(room);

@@ -87,17 +87,17 @@ static void follow(const cav_problem *problem, const double *end, double time, d
   cav_integrate(m, a.q, tangent, s, q);
 }
 
-/// Radius of a wheel, from its centre down to where it touches the world at the state; 0: it does not.
+/// Radius of a wheel, from its centre down to where it stands on the world, or something else, at the state; 0: it does not.
 static double wheel_radius(const cav_state *state, int link) {
   for (int i = 0; i < state->ncontact; i++) {
     const cav_contact *c = &state->contact[i];
-    if (c->dist < near_ground && ((c->link1 == 0 && c->link2 == link) || (c->link2 == 0 && c->link1 == link)))
-      return fmax(state->com[3 * (size_t)link + 2] - c->pos[2], 0);
+    const double down = state->com[3 * (size_t)link + 2] - c->pos[2];
+    if (c->dist < near_ground && (c->link1 == link || c->link2 == link) && down > 0) return down;
   }
   return 0;
 }
 
-/// Rolls the wheels that touch the ground at the start along with the guess, those whose goal is no other angle.
+/// Rolls the wheels that stand on something at the start along with the guess, those whose goal is no other angle.
 static cav_status roll(const cav_problem *problem, cav_trajectory *at) {
   const cav_model *m = problem->model;
   static const double up[3] = {0, 0, 1};

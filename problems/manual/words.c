@@ -151,18 +151,18 @@ static const struct {
      "constraint"},
     {"catch|catching|caught|intercept",
      "what is caught comes by itself: <root joint=\"ball\" linvel=\"-1 0 0\"/> of <start>; <root joint=\"ball\" .../> "
-     "of "
-     "<goal> or\n"
-     "  <sensor type=\"framepos\" body=\"ball\" .../> says where it is in the end. A hand is brought to it by framepos "
-     "with\n"
-     "  refname=\"ball\" at that time; contacts do not bounce by themselves, and nothing closes a hand (help grasp)",
-     "qvel"},
+     "of\n"
+     "  <goal> or <sensor type=\"framepos\" body=\"ball\" .../> says where it is in the end. A hand is brought to it "
+     "by\n"
+     "  framepos with refname=\"ball\" at that time; contacts do not bounce by themselves, and nothing closes a hand\n"
+     "  (help grasp)",
+     "linvel"},
     {"rolling|rolls|spin|spinning",
-     "a ball rolls by the friction of its contact, and rolling is no slip. A start that rolls to -x has, in <start>,\n"
-     "  <root joint=\"ball\" linvel=\"-1 0 0\" angvel=\"0 -W 0\"/>, W = speed over radius, about y. It rolls on "
-     "without end, but for friction=\"1 0.005 0.01\" "
-     "condim=\"6\" of\n"
-     "  its geom (MJCF); what still rolls at the end asks for <horizon close=\"open\"/>",
+     "a ball rolls by the friction of its contact, and rolling is no slip. One that rolls to -x has, in <start>,\n"
+     "  <root joint=\"ball\" linvel=\"-1 0 0\" angvel=\"0 -W 0\"/>, W = speed over radius. It rolls on without end, "
+     "but\n"
+     "  for friction=\"1 0.005 0.01\" condim=\"6\" of its geom (MJCF); what still rolls at the end asks for <horizon\n"
+     "  close=\"open\"/>",
      "linvel"},
     {"hold|held|keep|stay|still|freeze|rest|pause",
      "a posture, place or angle is held by a term over a while: from=\"1\" to=\"2\" in place of at=; a whole motion\n"
