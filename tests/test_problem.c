@@ -4,6 +4,7 @@
 #include "check.h"
 #include "problem_file.h"
 #include "problem_folder.h"
+#include "verification.h"
 
 static char copy_path[128], csv_path[128];
 
@@ -82,6 +83,25 @@ static void check_start_velocity(void) {
     for (int i = 0; i < 7; i++) CHECK_NEAR(p->v_start[i], wanted[k][i], 1e-14);
     cav_problem_free(p);
   }
+}
+
+// dofs="driven": a hinge that a motor moves and what hangs on it, no door, and nothing that floats
+static void check_driven(void) {
+  write_in("ball.xml",
+           "<mujoco><worldbody><body><joint name='motor' axis='0 1 0'/><geom size='.1'/><body pos='.3 0 0'>"
+           "<joint name='loose' axis='0 1 0'/><geom size='.1'/></body></body><body pos='2 0 0'><joint name='door' "
+           "axis='0 0 1'/><geom size='.1' pos='.3 0 0'/></body><body pos='4 0 1'><freejoint/><geom size='.1'/></body>"
+           "</worldbody><actuator><motor joint='motor'/></actuator></mujoco>");
+  cav_problem *p = load(
+      "<problem model='ball.xml'><horizon duration='1'/><start/><cost>"
+      "<posture name='of it' dofs='driven' at='end' weight='9'/></cost></problem>");
+  const cav_term *term = p ? find(p, "of it") : NULL;
+  if (CHECK(term && p->model->nv == 9))
+    for (int d = 0; d < 9; d++) {
+      CHECK(cav_problem_selects(p->model, term, d) == (d < 2));
+      CHECK(cav_verification_selects(p->model, term, d) == (d < 2));
+    }
+  cav_problem_free(p);
 }
 
 /// The default posture holds no wheel at an angle: an unlimited hinge through the centre of mass of what it turns. It does hold
@@ -565,6 +585,7 @@ int main(void) {
   write_in("robot.urdf", turntable);
   check_defaults();
   check_start_velocity();
+  check_driven();
   check_wheels();
   check_words();
   check_quantities();
