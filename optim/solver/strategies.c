@@ -43,6 +43,9 @@ enum {
 /// s: shorter steps are not halved by a strategy of its own.
 static const double coarse = 0.015;
 
+/// What the strategy `line` is, wherever it stands in the list.
+static const char straight[] = "straight from start to goal";
+
 /// Dofs up to which sampling takes less time than another solve.
 enum { TINY = 5 };
 
@@ -394,8 +397,6 @@ static cav_status find_guesses(const cav_problem *problem, const cav_strategy *s
   if (stated_so) g->fly.height = 0;
   return status;
 }
-
-static const char straight[] = "straight from start to goal";
 
 /// From the straight way and from the start held, where the stated guess is neither.
 static void add_plain(const cav_problem *problem, cav_strategy *strategy, int *n, const guesses *g) {

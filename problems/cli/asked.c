@@ -12,6 +12,7 @@
 #include "command.h"
 #include "math3.h"
 #include "objects.h"
+#include "problem_file.h"
 #include "quantity.h"
 #include "rotation.h"
 
@@ -126,11 +127,7 @@ static int farthest(const cav_problem *p, const cav_term *term, const double *wa
     const cav_joint *joint = &m->joint[m->dof[i].joint];
     const int free = joint->type == CAV_JOINT_FREE,
               line = joint->type == CAV_JOINT_SLIDE || (free && i < joint->dof + 3);
-    const int selected = term->dofs == CAV_DOFS_ALL || (term->dofs == CAV_DOFS_JOINTS && !free) ||
-                         (term->dofs == CAV_DOFS_DRIVEN && !free && m->link[joint->link].driven) ||
-                         (term->dofs == CAV_DOFS_ROOT_LINEAR && free && line) ||
-                         (term->dofs == CAV_DOFS_ROOT_ANGULAR && free && !line) ||
-                         (term->dofs == CAV_DOFS_ONE && m->dof[i].joint == term->joint);
+    const int selected = cav_problem_selects(m, term, i);
     d[i] = selected ? fabs(d[i]) / (line ? CAV_WITHIN_LENGTH : CAV_WITHIN_ANGLE) : -1;
     if (selected && (most < 0 || d[i] > d[most])) most = i;
   }
