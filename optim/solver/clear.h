@@ -17,7 +17,7 @@ double cav_lowest_point(const cav_model *model, const cav_state *state, int root
 /// Whether a contact is with a solid of the world, of which grounds are none.
 int cav_is_with_solid(const cav_model *model, const cav_contact *contact);
 
-/// Lifts the knots of a guess out of the world, but the first.
+/// Lifts the knots of a guess out of the world, but the first, or takes them below what hangs in the way, where that is shorter.
 cav_status cav_clear(const cav_model *model, cav_trajectory *guess);
 
 /// Raises and lowers the first tree that can rise onto what is below it, at each knot but the first and the last: so high
