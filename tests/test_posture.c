@@ -2,6 +2,7 @@
 /// what is upright, what is low, what is on the ground and over what the centre of mass is. Names in problem files.
 #include "cavort/cavort.h"
 #include "check.h"
+#include "extent.h"
 #include "posture.h"
 #include "role.h"
 #include "scene.h"
@@ -20,7 +21,7 @@ static double lowest(const cav_model *m, const cav_state *state, int body) {
   for (int g = m->body[body].geom; g < m->body[body].geom + m->body[body].ngeom; g++) {
     if (!m->geom[g].contype && !m->geom[g].conaffinity) continue;
     cav_object_pose(m, state, CAV_OBJECT_GEOM, g, &at);
-    least = fmin(least, at.pos[2] - cav_geom_reach(&m->geom[g], &at, (double[]){0, 0, 1}));
+    least = fmin(least, cav_geom_bottom(m, g, &at));
   }
   return least;
 }
@@ -68,11 +69,12 @@ static void look(const cav_model *m, cav_state *state, const cav_roles *roles, c
     while (m->body[top].parent > 0) top = m->body[top].parent;
     if (top != root || (!m->geom[g].contype && !m->geom[g].conaffinity)) continue;
     cav_object_pose(m, state, CAV_OBJECT_GEOM, g, &at);
-    double low = at.pos[2] - cav_geom_reach(&m->geom[g], &at, (double[]){0, 0, 1});
+    double low = cav_geom_bottom(m, g, &at);
     s->least = fmin(s->least, low);
     for (int k = 0; k < 2 && low < 0.01; k++) {
-      double reach = cav_geom_reach(&m->geom[g], &at, (double[]){k == 0, k == 1, 0});
-      s->from[k] = fmin(s->from[k], at.pos[k] - reach), s->to[k] = fmax(s->to[k], at.pos[k] + reach);
+      const double n[3] = {k == 0, k == 1, 0}, back[3] = {-n[0], -n[1], 0};
+      s->from[k] = fmin(s->from[k], at.pos[k] - cav_geom_reach(m, g, &at, back));
+      s->to[k] = fmax(s->to[k], at.pos[k] + cav_geom_reach(m, g, &at, n));
     }
   }
   const cav_sensor sensor = {
@@ -147,6 +149,29 @@ static void check_model(const char *path, int floating, const char *refused) {
   cav_model_free(m);
 }
 
+// a robot of meshes is on the floor where collisions see it there, and lies on its back, not on what a box about it would reach
+static void check_meshes(const char *path) {
+  static const char *const posture[] = {"lie-back", "lie-front", "kneel", "all-fours", "squat"};
+  cav_model *m = shipped_load(path, 0);
+  if (!m) return;
+  cav_state *state = cav_state_new(m);
+  double *q = scene_vector(m->nq);
+  for (size_t i = 0; i < sizeof posture / sizeof *posture; i++) {
+    cav_error error = {0};
+    double least = INFINITY;
+    CHECK(cav_configuration_posture(m, state, posture[i], q, &error) == CAV_OK);
+    CHECK(cav_configuration_to_floor(m, state, NULL, q, &error) == CAV_OK);
+    state->options.smoothing = 0.1;
+    CHECK(cav_position(m, state, q) == CAV_OK);
+    for (int k = 0; k < state->ncontact; k++)
+      if (state->contact[k].link1 == 0 || state->contact[k].link2 == 0) least = fmin(least, state->contact[k].dist);
+    CHECK_NEAR(least, 0, 1e-9);
+  }
+  free(q);
+  cav_state_free(state);
+  cav_model_free(m);
+}
+
 static cav_problem *load(const char *folder, const char *start, cav_error *error) {
   char text[1000];
   snprintf(
@@ -191,6 +216,7 @@ int main(void) {
       check_model(path, model[i].floating, model[i].refused);
     else
       CHECK(model[i].shared);
+  if (CHECK(shipped_path("unitree/g1/scene_29dof.xml", 1, path))) check_meshes(path);
   if (!CHECK(mkdtemp(folder) != NULL)) return check_result();
   check_files(folder);
   scene_remove(folder);

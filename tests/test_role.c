@@ -5,6 +5,7 @@
 
 #include "cavort/cavort.h"
 #include "check.h"
+#include "extent.h"
 #include "role.h"
 #include "scene.h"
 #include "shipped.h"
@@ -168,10 +169,11 @@ static void check_stand(const cav_model *m, cav_state *state, const char *name) 
       const cav_body *foot = &m->body[roles.body[r]];
       for (int g = foot->geom; g < foot->geom + foot->ngeom; g++) {
         cav_object_pose(m, state, CAV_OBJECT_GEOM, g, &at);
-        low = fmin(low, at.pos[2] - cav_geom_reach(&m->geom[g], &at, (double[]){0, 0, 1}));
+        low = fmin(low, cav_geom_bottom(m, g, &at));
         for (int k = 0; k < 2; k++) {
-          double reach = cav_geom_reach(&m->geom[g], &at, (double[]){k == 0, k == 1, 0});
-          least[k] = fmin(least[k], at.pos[k] - reach), most[k] = fmax(most[k], at.pos[k] + reach);
+          const double n[3] = {k == 0, k == 1, 0}, back[3] = {-n[0], -n[1], 0};
+          least[k] = fmin(least[k], at.pos[k] - cav_geom_reach(m, g, &at, back));
+          most[k] = fmax(most[k], at.pos[k] + cav_geom_reach(m, g, &at, n));
         }
       }
       // blocks at the ends of four legs tilt with the shanks

@@ -127,4 +127,8 @@ int cav_touch_rates(cav_pair_manifolds *m, const double point[3], int feature, c
 /// surface where it leaves; a plane is met from above only, within its size where that is not 0. ray.c.
 double cav_ray(const cav_shape *shape, const double point[3], const double direction[3]);
 
+/// Vertex of a mesh furthest along a direction [3] in its axes: of few the furthest of all; else from a vertex known for
+/// directions about this one uphill from neighbour to neighbour, which on a convex body ends at the top. surface.c.
+int cav_mesh_summit(const cav_mesh *mesh, const double direction[3]);
+
 #endif

@@ -16,10 +16,7 @@ cav_surface cav_surface_box, cav_surface_cylinder, cav_surface_ellipsoid;
 /// surface.c.
 void cav_shape_support(const cav_shape *shape, const double direction[3], double point[3]);
 
-/// Vertex of a mesh furthest along a direction [3] in its axes: of few the furthest of all; else from a vertex known for
-/// directions about this one uphill from neighbour to neighbour, which on a convex body ends at the top. surface.c.
-int cav_mesh_summit(const cav_mesh *mesh, const double direction[3]);
-/// The same, from a vertex near it if that is higher than the one known; -1: no such vertex.
+/// As cav_mesh_summit, from a vertex near it if that is higher than the one known; -1: no such vertex.
 int cav_mesh_summit_from(const cav_mesh *mesh, const double direction[3], int near);
 
 /// Segment swept by a sphere (the capsule a) against a solid b with a surface: up to 2 points. segment.c.

@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "extent.h"
 #include "fit.h"
 #include "math3.h"
 #include "role.h"
@@ -18,10 +19,10 @@ static const double clear_most = 0.02; // m
 enum { FLAT = 2 };
 
 // how far a geom reaches along a direction of any length, times that
-static double reach_along(const cav_geom *geom, const cav_pose *pose, const double n[3]) {
+static double reach_along(const cav_model *m, int geom, const cav_pose *pose, const double n[3]) {
   double unit[3], length = norm3(n);
   scale3(unit, 1 / length, n);
-  return length * cav_geom_reach(geom, pose, unit);
+  return length * cav_geom_reach(m, geom, pose, unit);
 }
 
 // where the floor is touched by the part of a body's geoms that is farthest along a direction n, not of unit length, at the
@@ -33,7 +34,7 @@ static int farthest_point(const cav_fit *fit, int body, const double n[3], doubl
   int farthest = -1;
   for (int g = m->body[body].geom; g < m->body[body].geom + m->body[body].ngeom; g++) {
     cav_object_pose(m, fit->state, CAV_OBJECT_GEOM, g, &pose);
-    double reach = dot3(pose.pos, n) + reach_along(&m->geom[g], &pose, n);
+    double reach = dot3(pose.pos, n) + reach_along(m, g, &pose, n);
     if (reach > most) most = reach, farthest = g;
   }
   if (farthest < 0) return 0;
@@ -44,7 +45,7 @@ static int farthest_point(const cav_fit *fit, int body, const double n[3], doubl
       double bent[3];
       copy3(bent, n);
       bent[k] += side ? bend : -bend;
-      reach[side] = reach_along(&m->geom[farthest], &pose, bent);
+      reach[side] = reach_along(m, farthest, &pose, bent);
     }
     point[k] = pose.pos[k] + (reach[1] - reach[0]) / (2 * bend);
   }

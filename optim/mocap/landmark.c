@@ -4,6 +4,7 @@
 
 #include <math.h>
 
+#include "extent.h"
 #include "math3.h"
 
 enum { JOINTS = 40 };
@@ -88,7 +89,7 @@ static double extent(const limb *l, const double n[3]) {
   for (int g = body->geom; g < body->geom + body->ngeom; g++) {
     cav_pose at;
     cav_object_pose(l->model, l->state, CAV_OBJECT_GEOM, g, &at);
-    most = fmax(most, dot3(n, at.pos) + cav_geom_reach(&l->model->geom[g], &at, n));
+    most = fmax(most, dot3(n, at.pos) + cav_geom_reach(l->model, g, &at, n));
   }
   return most;
 }

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "edit.h"
+#include "extent.h"
 #include "fit.h"
 #include "math3.h"
 #include "periodicity.h"
@@ -89,7 +90,7 @@ static double lowest(const cav_model *m, const cav_state *state, int root) {
   for (int g = 0; g < m->ngeom; g++) {
     if (!m->geom[g].link || m->link[m->geom[g].link].root != root) continue;
     cav_object_pose(m, state, CAV_OBJECT_GEOM, g, &pose);
-    least = fmin(least, pose.pos[2] - cav_geom_reach(&m->geom[g], &pose, (const double[3]){0, 0, 1}));
+    least = fmin(least, cav_geom_bottom(m, g, &pose));
   }
   return least;
 }

@@ -6,34 +6,10 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "extent.h"
 #include "posture.h"
 #include "problem_file.h"
 #include "stand.h"
-
-double cav_geom_reach(const cav_geom *geom, const cav_pose *pose, const double n[3]) {
-  const double *r = pose->rotation, *s = geom->size;
-  double x = n[0] * r[0] + n[1] * r[3] + n[2] * r[6];
-  double y = n[0] * r[1] + n[1] * r[4] + n[2] * r[7];
-  double z = n[0] * r[2] + n[1] * r[5] + n[2] * r[8];
-  switch (geom->type) {
-    case CAV_GEOM_SPHERE:
-      return s[0];
-    case CAV_GEOM_CAPSULE:
-      return s[0] + s[1] * fabs(z);
-    case CAV_GEOM_ELLIPSOID:
-      return sqrt(s[0] * s[0] * x * x + s[1] * s[1] * y * y + s[2] * s[2] * z * z);
-    case CAV_GEOM_CYLINDER:
-      return s[0] * sqrt(x * x + y * y) + s[1] * fabs(z);
-    case CAV_GEOM_BOX:
-    case CAV_GEOM_MESH: // its box
-      return s[0] * fabs(x) + s[1] * fabs(y) + s[2] * fabs(z);
-    case CAV_GEOM_PLANE:
-    case CAV_GEOM_HFIELD:
-    case CAV_GEOM_TYPES:
-      break;
-  }
-  return 0;
-}
 
 // first joint that raises a tree: free, or a slide along the vertical. Its coordinate of height and how much that
 // raises
@@ -61,8 +37,9 @@ static double way_to_plane(const cav_model *m, const cav_state *state, int root)
     cav_pose floor, at;
     cav_object_pose(m, state, CAV_OBJECT_GEOM, m->pair[p].geom1, &floor);
     cav_object_pose(m, state, CAV_OBJECT_GEOM, m->pair[p].geom2, &at);
-    double n[3] = {floor.rotation[2], floor.rotation[5], floor.rotation[8]}, distance = -cav_geom_reach(geom, &at, n);
+    double n[3] = {floor.rotation[2], floor.rotation[5], floor.rotation[8]};
     if (n[2] < 0.1) continue;
+    double distance = -cav_geom_reach(m, m->pair[p].geom2, &at, (const double[3]){-n[0], -n[1], -n[2]});
     for (int i = 0; i < 3; i++) distance += n[i] * (at.pos[i] - floor.pos[i]);
     up = fmax(up, -distance / n[2]);
   }

@@ -12,6 +12,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "extent.h"
 #include "math3.h"
 #include "posture_search.h"
 #include "stand.h"
@@ -211,7 +212,7 @@ static void find_heights(const poser *p, double height[PARTS]) {
     if (part < 0 || (!geom->contype && !geom->conaffinity)) continue;
     cav_pose at;
     cav_object_pose(m, p->state, CAV_OBJECT_GEOM, g, &at);
-    height[part] = fmin(height[part], at.pos[2] - cav_geom_reach(geom, &at, (double[]){0, 0, 1}));
+    height[part] = fmin(height[part], cav_geom_bottom(m, g, &at));
   }
 }
 

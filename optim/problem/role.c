@@ -8,6 +8,7 @@
 /// head. A trunk that stands in the world and has no legs is one of arms; one without pairs and with a chain of three
 /// joints or more is an arm. Forward is where feet point, else along +x, or +y where left and right lie along x.
 #include "role.h"
+#include "extent.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -163,7 +164,7 @@ static double lowest(const search *s, int i) {
   double least = body->ngeom ? INFINITY : at.pos[2];
   for (int g = body->geom; g < body->geom + body->ngeom; g++) {
     cav_object_pose(m, s->state, CAV_OBJECT_GEOM, g, &at);
-    least = fmin(least, at.pos[2] - cav_geom_reach(&m->geom[g], &at, (double[]){0, 0, 1}));
+    least = fmin(least, cav_geom_bottom(m, g, &at));
   }
   return least;
 }
@@ -231,7 +232,7 @@ static int find_tip(const search *s, int i) {
   for (int g = body->geom; g < body->geom + body->ngeom && body->ngeom > 1; g++) {
     cav_pose at;
     cav_object_pose(s->model, s->state, CAV_OBJECT_GEOM, g, &at);
-    double z = at.pos[2] - cav_geom_reach(&s->model->geom[g], &at, (double[]){0, 0, 1});
+    double z = cav_geom_bottom(s->model, g, &at);
     if (z < least && *s->model->geom[g].name) least = z, tip = g;
   }
   return tip;
@@ -247,8 +248,9 @@ static void face(search *s, limb_pair *legs) {
     double front = -INFINITY, back = INFINITY, from = ahead(s, ankle.pos);
     for (int g = foot->geom; g < foot->geom + foot->ngeom; g++) {
       cav_object_pose(s->model, s->state, CAV_OBJECT_GEOM, g, &at);
-      double n[3] = {s->forward[0], s->forward[1], 0}, reach = cav_geom_reach(&s->model->geom[g], &at, n);
-      front = fmax(front, ahead(s, at.pos) + reach), back = fmin(back, ahead(s, at.pos) - reach);
+      const double n[3] = {s->forward[0], s->forward[1], 0}, behind[3] = {-n[0], -n[1], 0};
+      front = fmax(front, ahead(s, at.pos) + cav_geom_reach(s->model, g, &at, n));
+      back = fmin(back, ahead(s, at.pos) - cav_geom_reach(s->model, g, &at, behind));
     }
     if (foot->ngeom) way += (front + back) / 2 - from;
   }

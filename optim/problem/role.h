@@ -62,7 +62,4 @@ cav_role cav_role_named(const char *name);
 /// Names of the roles that were found, by commas, as far as size goes; "" if there are none.
 void cav_roles_list(const cav_roles *roles, char *out, int size);
 
-/// How far a geom reaches from its centre against the unit direction n; floor.c.
-double cav_geom_reach(const cav_geom *geom, const cav_pose *pose, const double n[3]);
-
 #endif

@@ -13,6 +13,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "extent.h"
 #include "posture_search.h"
 
 static const double straight = 0.93;   // leg's length over that of its parts
@@ -63,8 +64,9 @@ static void find_sole(stander *s, int k, int geom) {
   for (int g = from; g < to; g++) {
     cav_object_pose(m, s->state, CAV_OBJECT_GEOM, g, &at);
     for (int i = 0; i < 3; i++) {
-      double n[3] = {i == 0, i == 1, i == 2}, reach = cav_geom_reach(&m->geom[g], &at, n);
-      least[i] = fmin(least[i], at.pos[i] - reach), most[i] = fmax(most[i], at.pos[i] + reach);
+      const double n[3] = {i == 0, i == 1, i == 2}, back[3] = {-n[0], -n[1], -n[2]};
+      least[i] = fmin(least[i], at.pos[i] - cav_geom_reach(m, g, &at, back));
+      most[i] = fmax(most[i], at.pos[i] + cav_geom_reach(m, g, &at, n));
     }
   }
   cav_object_pose(m, s->state, CAV_OBJECT_BODY, s->foot[k], &at);

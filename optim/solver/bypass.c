@@ -9,6 +9,7 @@
 #include "clear.h"
 #include "continuation.h"
 #include "detour.h"
+#include "extent.h"
 #include "role.h"
 
 enum { KNOTS = 41 };
@@ -37,12 +38,11 @@ static cav_status find_height(search *s, int root) {
 
 // whether a geom of the world stands on the ground and is as high as the body
 static int is_tall(const search *s, int g) {
-  static const double up[3] = {0, 0, 1}, down[3] = {0, 0, -1};
-  const cav_geom *geom = &s->bowed.model->geom[g];
+  static const double up[3] = {0, 0, 1};
   cav_pose pose;
   cav_object_pose(s->bowed.model, s->state, CAV_OBJECT_GEOM, g, &pose);
-  const double top = pose.pos[2] + cav_geom_reach(geom, &pose, up),
-               bottom = pose.pos[2] - cav_geom_reach(geom, &pose, down);
+  const double top = pose.pos[2] + cav_geom_reach(s->bowed.model, g, &pose, up),
+               bottom = cav_geom_bottom(s->bowed.model, g, &pose);
   return top - s->floor > high * s->height && bottom - s->floor < grounded * s->height;
 }
 

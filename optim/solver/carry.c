@@ -7,6 +7,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "extent.h"
 #include "math3.h"
 #include "quantity.h"
 #include "role.h"
@@ -147,7 +148,7 @@ static void find_sides(const hands *h, const cav_pose *body, double away, double
     scale3(back, -1, n);
     cav_object_pose(h->m, h->state, CAV_OBJECT_GEOM, h->geom[k], &hand);
     const double out = cav_thing_surface(h->m, h->state, h->thing.link, n, centre, &lowest);
-    axpy3(place[k], centre, out + away * cav_geom_reach(&h->m->geom[h->geom[k]], &hand, back), n);
+    axpy3(place[k], centre, out + away * cav_geom_reach(h->m, h->geom[k], &hand, back), n);
   }
 }
 
@@ -166,12 +167,11 @@ static void find_back(const hands *h, double away, double place[2][3]) {
   sub3(side, h->at[1], h->at[0]);
   const double apart = fmin(within_width * width, 0.5 * hypot(side[0], side[1]));
   for (int k = 0; k < 2; k++) {
-    const cav_geom *geom = &h->m->geom[h->geom[k]];
     cav_pose hand;
     cav_object_pose(h->m, h->state, CAV_OBJECT_GEOM, h->geom[k], &hand);
-    axpy3(place[k], centre, depth + away * cav_geom_reach(geom, &hand, n), n);
+    axpy3(place[k], centre, depth + away * cav_geom_reach(h->m, h->geom[k], &hand, ahead), n);
     axpy3(place[k], place[k], k ? -apart : apart, across);
-    const double thick = cav_geom_reach(geom, &hand, up), tips = lowest + steady * edge / h->friction;
+    const double thick = cav_geom_reach(h->m, h->geom[k], &hand, up), tips = lowest + steady * edge / h->friction;
     const double high = h->thing.joint < 0 ? fmin(h->at[k][2], tips) : h->at[k][2];
     place[k][2] = fmax(fmin(high, top - thick), lowest + thick);
   }

@@ -9,6 +9,7 @@
 #include <string.h>
 
 #include "continuation.h"
+#include "extent.h"
 #include "math3.h"
 #include "role.h"
 
@@ -84,21 +85,19 @@ int cav_first_free(const cav_model *m) {
 }
 
 double cav_lowest_point(const cav_model *m, const cav_state *state, int root) {
-  static const double down[3] = {0, 0, -1};
   double lowest = INFINITY;
   for (int g = 0; g < m->ngeom; g++) {
     cav_pose pose;
     if (m->geom[g].link == 0 || !(m->geom[g].contype || m->geom[g].conaffinity)) continue;
     if (root && m->link[m->geom[g].link].root != root) continue;
     cav_object_pose(m, state, CAV_OBJECT_GEOM, g, &pose);
-    lowest = fmin(lowest, pose.pos[2] - cav_geom_reach(&m->geom[g], &pose, down));
+    lowest = fmin(lowest, cav_geom_bottom(m, g, &pose));
   }
   return lowest;
 }
 
 /// Whether all solids that a model is in at a configuration hang over a height.
 static cav_status is_hung_over(const cav_model *m, cav_state *state, const double *q, double lowest, int *hung) {
-  static const double down[3] = {0, 0, -1};
   cav_status status = cav_position(m, state, q);
   *hung = 1;
   for (int i = 0; i < state->ncontact && !status; i++) {
@@ -107,7 +106,7 @@ static cav_status is_hung_over(const cav_model *m, cav_state *state, const doubl
     const int g = c->link1 == 0 ? m->pair[c->pair].geom1 : m->pair[c->pair].geom2;
     cav_pose pose;
     cav_object_pose(m, state, CAV_OBJECT_GEOM, g, &pose);
-    *hung &= pose.pos[2] - cav_geom_reach(&m->geom[g], &pose, down) > lowest + hanging;
+    *hung &= cav_geom_bottom(m, g, &pose) > lowest + hanging;
   }
   return status;
 }

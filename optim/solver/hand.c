@@ -8,6 +8,7 @@
 
 #include <math.h>
 
+#include "extent.h"
 #include "math3.h"
 #include "quantity.h"
 #include "role.h"
@@ -70,16 +71,16 @@ static cav_status find_geom(const cav_model *m, cav_state *state, const double *
 /// Where a geom pushes a thing from, at the start, in the frame of the thing's body.
 static void find_place(const cav_model *m, const cav_state *state, const cav_thing *t, int geom, double away,
                        double place[3]) {
-  static const double up[3] = {0, 0, 1};
-  double back[3], centre[3], lowest, far[3];
+  double back[3], ahead[3], centre[3], lowest, far[3];
   cav_pose hand, body;
   scale3(back, -1, t->way);
   back[2] = 0;
   normalise3(back);
+  scale3(ahead, -1, back);
   const double out = cav_thing_surface(m, state, t->link, back, centre, &lowest);
   cav_object_pose(m, state, CAV_OBJECT_GEOM, geom, &hand);
-  axpy3(far, centre, out + away * cav_geom_reach(&m->geom[geom], &hand, back), back);
-  far[2] = fmax(far[2], lowest + cav_geom_reach(&m->geom[geom], &hand, up) + clear);
+  axpy3(far, centre, out + away * cav_geom_reach(m, geom, &hand, ahead), back);
+  far[2] = fmax(far[2], lowest + hand.pos[2] - cav_geom_bottom(m, geom, &hand) + clear);
   cav_object_pose(m, state, CAV_OBJECT_XBODY, m->link[t->link].body, &body);
   sub3(far, far, body.pos);
   rotate_back(place, body.rotation, far);
@@ -162,8 +163,9 @@ static void clamp_to_site(const cav_model *m, const cav_state *state, int index,
 }
 
 /// The place on the surface of a geom nearest to x, of round ones and meshes towards their middle, and the normal out of it.
-static void surface_near(const cav_geom *geom, const cav_pose *pose, const double x[3], double at[3],
+static void surface_near(const cav_model *m, int g, const cav_pose *pose, const double x[3], double at[3],
                          double normal[3]) {
+  const cav_geom *geom = &m->geom[g];
   double d[3], local[3];
   column3(normal, pose->rotation, 2);
   sub3(d, x, pose->pos);
@@ -173,7 +175,7 @@ static void surface_near(const cav_geom *geom, const cav_pose *pose, const doubl
   }
   if (geom->type != CAV_GEOM_BOX) {
     if (norm3(d) > 0) scale3(normal, 1 / norm3(d), d);
-    axpy3(at, pose->pos, cav_geom_exit(geom, pose, normal), normal);
+    axpy3(at, pose->pos, cav_geom_exit(m, g, pose, normal), normal);
     return;
   }
   int face = 0;
@@ -212,7 +214,7 @@ static void weigh_meeting(const cav_problem *p, const cav_state *state, const ca
   copy3(x, hand.pos);
   if (place_asked(p, t, m->geom[mover].link, x)) one.grade = 3;
   if (on_ground && t->sensor->object_type == CAV_OBJECT_SITE) clamp_to_site(m, state, t->sensor->object, x);
-  surface_near(&m->geom[ground], &pose, x, one.at, one.normal);
+  surface_near(m, ground, &pose, x, one.at, one.normal);
   sub3(d, hand.pos, one.at);
   one.far = norm3(d);
   if (one.grade > best->grade || (one.grade == best->grade && one.far < best->far)) *best = one;
@@ -239,7 +241,8 @@ static cav_status find_meeting(const cav_problem *p, cav_state *state, const tou
 
 /// How far a geom's middle is from the surface it lies on with its broadest side, m: a shin that kneels lies flat,
 /// whichever way it points before; of a mesh as far as it reaches as it is.
-static double lying(const cav_geom *geom, const cav_pose *pose, const double back[3]) {
+static double lying(const cav_model *m, int g, const cav_pose *pose, const double back[3]) {
+  const cav_geom *geom = &m->geom[g];
   switch (geom->type) {
     case CAV_GEOM_CAPSULE:
       return geom->size[0];
@@ -249,7 +252,7 @@ static double lying(const cav_geom *geom, const cav_pose *pose, const double bac
     case CAV_GEOM_ELLIPSOID:
       return fmin(geom->size[0], fmin(geom->size[1], geom->size[2]));
     default:
-      return cav_geom_reach(geom, pose, back);
+      return cav_geom_reach(m, g, pose, back);
   }
 }
 
@@ -263,8 +266,7 @@ static void lay_meeting(const cav_model *m, const cav_state *state, const touche
   scale3(back, -1, one->normal);
   cav_object_pose(m, state, CAV_OBJECT_GEOM, one->mover, &mover);
   const int lies = t->sensor->object_type != CAV_OBJECT_SITE && cav_touch_sees(m, t->sensor, one->mover);
-  const double reach =
-      lies ? lying(&m->geom[one->mover], &mover, back) : cav_geom_reach(&m->geom[one->mover], &mover, back);
+  const double reach = lies ? lying(m, one->mover, &mover, back) : cav_geom_reach(m, one->mover, &mover, back);
   axpy3(hand->place, one->at, away * reach, one->normal);
   hand->term[0] = cav_leading_term(CAV_SENSOR_FRAMEPOS, CAV_OBJECT_GEOM, one->mover, hand->place);
   hand->term[0].from = t->from, hand->term[0].to = t->to;

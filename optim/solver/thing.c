@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "extent.h"
 #include "math3.h"
 #include "quantity.h"
 #include "role.h"
@@ -177,33 +178,8 @@ cav_status cav_thing_find(const cav_problem *problem, int lifted, cav_state *sta
   return status;
 }
 
-double cav_geom_exit(const cav_geom *geom, const cav_pose *pose, const double n[3]) {
-  double d[3], least = INFINITY;
-  const double *s = geom->size;
-  rotate_back(d, pose->rotation, n);
-  const double across = hypot(d[0], d[1]);
-  switch (geom->type) {
-    case CAV_GEOM_SPHERE:
-      return s[0];
-    case CAV_GEOM_ELLIPSOID:
-      return 1 / sqrt(pow(d[0] / s[0], 2) + pow(d[1] / s[1], 2) + pow(d[2] / s[2], 2));
-    case CAV_GEOM_CAPSULE:
-    case CAV_GEOM_CYLINDER:
-      if (across > 0) least = s[0] / across;
-      return fabs(d[2]) > 0 ? fmin(least, (s[1] + (geom->type == CAV_GEOM_CAPSULE ? s[0] : 0)) / fabs(d[2])) : least;
-    case CAV_GEOM_BOX:
-    case CAV_GEOM_MESH: // its box
-      for (int k = 0; k < 3; k++)
-        if (d[k] != 0) least = fmin(least, s[k] / fabs(d[k]));
-      return least;
-    default:
-      return 0;
-  }
-}
-
 double cav_thing_surface(const cav_model *m, const cav_state *state, int link, const double n[3], double centre[3],
                          double *lowest) {
-  static const double down[3] = {0, 0, 1};
   double out = 0;
   centre_of(m, state, link, centre);
   *lowest = INFINITY;
@@ -213,8 +189,8 @@ double cav_thing_surface(const cav_model *m, const cav_state *state, int link, c
     double arm[3];
     cav_object_pose(m, state, CAV_OBJECT_GEOM, g, &pose);
     sub3(arm, pose.pos, centre);
-    out = fmax(out, dot3(arm, n) + cav_geom_exit(&m->geom[g], &pose, n));
-    *lowest = fmin(*lowest, pose.pos[2] - cav_geom_reach(&m->geom[g], &pose, down));
+    out = fmax(out, dot3(arm, n) + cav_geom_exit(m, g, &pose, n));
+    *lowest = fmin(*lowest, cav_geom_bottom(m, g, &pose));
   }
   return out;
 }

@@ -26,9 +26,6 @@ cav_status cav_thing_find(const cav_problem *problem, int lifted, cav_state *sta
 double cav_thing_surface(const cav_model *model, const cav_state *state, int link, const double n[3], double centre[3],
                          double *lowest);
 
-/// How far the surface of a geom is from its centre along the unit direction n; of a capsule's ends what its cylinder has.
-double cav_geom_exit(const cav_geom *geom, const cav_pose *pose, const double n[3]);
-
 /// A cost on what a frame sensor of an object reads, which leads a guess and is no part of the problem.
 cav_term cav_leading_term(cav_sensor_type type, cav_object_type object_type, int object, const double *target);
 
