@@ -437,6 +437,7 @@ CAV_API cav_status cav_strategy_solve(const cav_problem *problem, const cav_stra
 #define CAV_TOLERANCE_STEP 1e-8        ///< rad or m
 #define CAV_LOST_DISTANCE 0.5          ///< m from its plan at which a replay has lost the motion
 #define CAV_TOLERANCE_PERIODICITY 1e-9 ///< m, rad, and these per step
+#define CAV_TOLERANCE_MIRRORED 0.05 ///< other half stride of what is nearly its own mirror image: as mirrored_force_max
 
 /// What the word optimal requires of a verdict's optimality: a fraction of the cost.
 #define CAV_TOLERANCE_OPTIMAL 1e-4
@@ -506,7 +507,10 @@ typedef struct cav_verdict {
   double push_survived_n_s;
   double
       periodicity_error; ///< cycles: how far the last knot is from the first one moved, m, rad, or their rates; else 0
-  int periods;           ///< that the closed loop ran for: 1, of cycles more
+  /// Mirrored cycles of a model that is its own mirror image but for millimetres of its masses: unactuated force in the other half
+  /// stride, fraction of weight, or effort beyond the planned limit, fraction of it, whichever is more: feedback makes it up. Else NaN.
+  double mirrored_force_max;
+  int periods; ///< that the closed loop ran for: 1, of cycles more
   double end_speed_m_s,
       end_rate_rad_s; ///< of end_body's tree, of its centre of mass and of itself; NaN where nothing moves
   char end_body[64]; ///< what still moves at an end that need not be at rest, what no actuator moves first; "": nothing

@@ -116,6 +116,7 @@ void cav_certificate_json(FILE *out, const cav_problem *problem, const cav_verdi
   write_number(out, "end_rate_rad_s", v->end_rate_rad_s);
   write_number(out, "push_survived_n_s", v->push_survived_n_s);
   write_number(out, "periodicity_error", v->periodicity_error);
+  write_number(out, "mirrored_force_max", v->mirrored_force_max);
   write_number(out, "periods", v->periods);
   write_number(out, "duration", v->duration);
   write_number(out, "solve_seconds", v->solve_seconds);

@@ -62,19 +62,14 @@ int cav_is_with_solid(const cav_model *m, const cav_contact *c) {
   return type != CAV_GEOM_PLANE && type != CAV_GEOM_HFIELD;
 }
 
-/// How deep the model is in the world where a state is: in all of it, or in solids alone.
-static double depth_in(const cav_model *m, const cav_state *state, int solids) {
-  double depth = 0;
-  for (int i = 0; i < state->ncontact; i++) {
-    const cav_contact *c = &state->contact[i];
-    if (solids ? cav_is_with_solid(m, c) : c->link1 == 0 || c->link2 == 0) depth = fmax(depth, -c->dist);
-  }
-  return depth;
-}
-
+/// How deep a configuration is in the world: in all of it, or in solids alone.
 static cav_status depth_at(const cav_model *m, cav_state *state, const double *q, int solids, double *depth) {
   cav_status status = cav_position(m, state, q);
-  *depth = status ? 0 : depth_in(m, state, solids);
+  *depth = 0;
+  for (int i = 0; i < state->ncontact && !status; i++) {
+    const cav_contact *c = &state->contact[i];
+    if (solids ? cav_is_with_solid(m, c) : c->link1 == 0 || c->link2 == 0) *depth = fmax(*depth, -c->dist);
+  }
   return status;
 }
 
@@ -96,69 +91,90 @@ double cav_lowest_point(const cav_model *m, const cav_state *state, int root) {
   return lowest;
 }
 
-/// Whether all solids that a model is in at a configuration hang over a height.
-static cav_status is_hung_over(const cav_model *m, cav_state *state, const double *q, double lowest, int *hung) {
-  cav_status status = cav_position(m, state, q);
-  *hung = 1;
-  for (int i = 0; i < state->ncontact && !status; i++) {
-    const cav_contact *c = &state->contact[i];
-    if (c->dist >= -touching || !cav_is_with_solid(m, c)) continue;
-    const int g = c->link1 == 0 ? m->pair[c->pair].geom1 : m->pair[c->pair].geom2;
-    cav_pose pose;
-    cav_object_pose(m, state, CAV_OBJECT_GEOM, g, &pose);
-    *hung &= cav_geom_bottom(m, g, &pose) > lowest + hanging;
-  }
-  return status;
-}
-
-/// How far a model that is in solids has to go down to be clear of them, up to most; infinite: that is no way.
-static cav_status find_way_below(const cav_model *m, cav_state *state, double *q, double lowest, double most,
-                                 double *down) {
-  double way = 0;
-  int hung;
-  cav_status status = is_hung_over(m, state, q, lowest, &hung);
-  double depth = status ? 0 : depth_in(m, state, 1);
-  while (!status && hung && depth > touching && way < most) {
-    cav_lift(m, -step, q), way += step;
-    status = depth_at(m, state, q, 1, &depth);
-  }
-  cav_lift(m, way, q);
-  *down = hung && depth <= touching ? way : INFINITY;
-  return status;
-}
-
 /// Ways out of the world of the knots of a guess: straight up; down, below solids, where it is in them or comes there on the way
-/// up, else negative; and a smooth course.
+/// up, else negative; and a smooth course. Of what actuators move, which takes all along; or of a thing, alone.
 typedef struct ways {
+  const cav_model *m;
+  cav_state *state;
+  int tree; ///< of the thing, 0: of what actuators move
   int n, window;
   double *up, *down, *wide, *course; ///< [n]
 } ways;
 
+/// Whether a contact is with the world, and of what a way is sought for.
+static int counts(const ways *w, const cav_contact *c) {
+  if (c->link1 > 0 && c->link2 > 0) return 0;
+  const cav_link *link = &w->m->link[c->link1 > 0 ? c->link1 : c->link2];
+  return w->tree ? link->root == w->tree : link->driven;
+}
+
+/// How deep it is in the world at a configuration; *met: whether in a solid, too.
+static cav_status depth_of(const ways *w, const double *q, double *depth, int *met) {
+  cav_status status = cav_position(w->m, w->state, q);
+  *depth = 0;
+  for (int i = 0; i < w->state->ncontact && !status; i++) {
+    const cav_contact *c = &w->state->contact[i];
+    if (!counts(w, c)) continue;
+    *depth = fmax(*depth, -c->dist);
+    *met |= -c->dist > touching && cav_is_with_solid(w->m, c);
+  }
+  return status;
+}
+
+static void raise_by(const ways *w, double height, double *q) { lift(w->m, w->tree, height, q); }
+
+/// Whether all solids that it is in at the state hang over a height.
+static int is_hung_over(const ways *w, double lowest) {
+  for (int i = 0; i < w->state->ncontact; i++) {
+    const cav_contact *c = &w->state->contact[i];
+    if (c->dist >= -touching || !counts(w, c) || !cav_is_with_solid(w->m, c)) continue;
+    const int g = c->link1 == 0 ? w->m->pair[c->pair].geom1 : w->m->pair[c->pair].geom2;
+    cav_pose pose;
+    cav_object_pose(w->m, w->state, CAV_OBJECT_GEOM, g, &pose);
+    if (cav_geom_bottom(w->m, g, &pose) <= lowest + hanging) return 0;
+  }
+  return 1;
+}
+
+/// How far what is in solids has to go down to be clear of them, up to most; infinite: that is no way.
+static cav_status find_way_below(const ways *w, double *q, double lowest, double most, double *down) {
+  double way = 0, depth;
+  int in = 0;
+  cav_status status = depth_of(w, q, &depth, &in);
+  const int hung = !status && is_hung_over(w, lowest);
+  while (!status && hung && in && way < most) {
+    raise_by(w, -step, q), way += step, in = 0;
+    status = depth_of(w, q, &depth, &in);
+  }
+  raise_by(w, way, q);
+  *down = hung && !in ? way : INFINITY;
+  return status;
+}
+
 /// The least lift of each knot, which it gets, and its way down.
-static cav_status find_ways(const cav_model *m, cav_state *state, cav_trajectory *at, double *before, ways *w) {
-  cav_status status = cav_position(m, state, at->q);
-  const double lowest = status ? 0 : cav_lowest_point(m, state, 0);
-  const double most = status ? 0 : crouch * (state->com[3 * (m->nlink > 1) + 2] - lowest);
+static cav_status find_ways(const ways *w, cav_trajectory *at, double *before) {
+  cav_status status = cav_position(w->m, w->state, at->q);
+  const double lowest = status ? 0 : cav_lowest_point(w->m, w->state, w->tree);
+  const double most = status ? 0 : crouch * (w->state->com[3 * (w->tree ? w->tree : w->m->nlink > 1) + 2] - lowest);
   for (int t = 1; t < w->n && !status; t++) {
     double *q = at->q + (size_t)t * at->nq, depth = 1;
     int met = 0;
     memcpy(before, q, (size_t)at->nq * sizeof *q);
     w->down[t] = -1;
     for (int k = 0; k < STEPS && !status; k++) {
-      status = depth_at(m, state, q, 0, &depth);
-      met |= depth_in(m, state, 1) > touching;
+      status = depth_of(w, q, &depth, &met);
       if (depth <= touching) break;
-      double up = fmax(depth, step);
-      cav_lift(m, up, q);
+      const double up = fmax(depth, step);
+      raise_by(w, up, q);
       w->up[t] += up;
     }
-    if (met && !status) status = find_way_below(m, state, before, lowest, most, &w->down[t]);
+    if (met && !status) status = find_way_below(w, before, lowest, most, &w->down[t]);
   }
   return status;
 }
 
 /// Takes knots that are in solids one soon after the other below these, where that is shorter for all of them.
-static void go_below(const cav_model *m, cav_trajectory *at, ways *w) {
+static void go_below(cav_trajectory *at, const ways *w) {
   const int soon = (int)ceil(together / at->timestep);
   for (int first = 1, last; first < w->n; first = last + 1) {
     double up = 0, down = 0;
@@ -170,7 +186,7 @@ static void go_below(const cav_model *m, cav_trajectory *at, ways *w) {
     }
     for (int t = first; t <= last; t++) {
       if (down <= up) {
-        cav_lift(m, -w->up[t] - fmax(w->down[t], 0), at->q + (size_t)t * at->nq);
+        raise_by(w, -w->up[t] - fmax(w->down[t], 0), at->q + (size_t)t * at->nq);
         w->up[t] = 0;
       } else {
         w->down[t] = 0;
@@ -181,7 +197,7 @@ static void go_below(const cav_model *m, cav_trajectory *at, ways *w) {
 }
 
 /// Lifts each knot, or lowers it, from the least that it got to a smooth course.
-static void follow_course(const cav_model *m, cav_trajectory *at, const ways *w, const double *least, double sign) {
+static void follow_course(cav_trajectory *at, const ways *w, const double *least, double sign) {
   memset(w->wide, 0, (size_t)w->n * sizeof *w->wide);
   for (int t = 0; t < w->n; t++)
     for (int k = -w->window; k <= w->window; k++)
@@ -195,21 +211,39 @@ static void follow_course(const cav_model *m, cav_trajectory *at, const ways *w,
     }
     w->course[t] = sum / weights;
     double rest = t < w->n - 1 ? fmax(w->course[t] - least[t], 0) : 0;
-    cav_lift(m, sign * rest, at->q + (size_t)t * at->nq);
+    raise_by(w, sign * rest, at->q + (size_t)t * at->nq);
   }
+}
+
+/// Clears a tree that nothing moves, or all that actuators do: 0.
+static cav_status clear_tree(ways *w, int tree, cav_trajectory *at, double *before) {
+  memset(w->up, 0, 4 * (size_t)w->n * sizeof *w->up);
+  w->tree = tree;
+  const cav_status status = find_ways(w, at, before);
+  if (status) return status;
+  go_below(at, w);
+  follow_course(at, w, w->up, 1);
+  follow_course(at, w, w->down, -1);
+  return CAV_OK;
+}
+
+/// Whether something lifts a tree that nothing moves, or any that actuators do: 0.
+static int can_rise(const cav_model *m, int tree) {
+  for (int j = 0; j < m->njoint; j++) {
+    const cav_link *link = &m->link[m->joint[j].link];
+    if (rises(m, &m->joint[j]) && (tree ? link->root == tree && !link->driven : link->driven)) return 1;
+  }
+  return 0;
 }
 
 cav_status cav_clear(const cav_model *m, cav_trajectory *at) {
   const size_t n = (size_t)at->nknot;
   cav_state *state = cav_state_new(m);
   double *room = calloc(4 * n + (size_t)at->nq, sizeof *room);
-  ways w = {at->nknot, (int)ceil(ahead / at->timestep), room, room + n, room + 2 * n, room + 3 * n};
-  cav_status status = state && room ? find_ways(m, state, at, room + 4 * n, &w) : CAV_NO_MEMORY;
-  if (!status) {
-    go_below(m, at, &w);
-    follow_course(m, at, &w, w.up, 1);
-    follow_course(m, at, &w, w.down, -1);
-  }
+  ways w = {m, state, 0, at->nknot, (int)ceil(ahead / at->timestep), room, room + n, room + 2 * n, room + 3 * n};
+  cav_status status = state && room ? CAV_OK : CAV_NO_MEMORY;
+  for (int tree = 0; tree < m->nlink && !status; tree++)
+    if (can_rise(m, tree)) status = clear_tree(&w, tree, at, room + 4 * n);
   cav_state_free(state);
   free(room);
   return status;

@@ -11,7 +11,7 @@
 #include "continuation.h"
 
 enum { KNOTS = 41, TRIES = 1500, CUBES = 6 };
-static const double largest = 1.5; // rad; of slides a third of it in m
+static const double largest = 1.5; // rad; of slides half their range, at least a third of it in m
 static const double clear = 0.02;  // m
 static const double inside = 1e-3; // m: deeper than where it begins and ends by so much is no way
 
@@ -69,6 +69,13 @@ int cav_detour_moves(const cav_model *m, int j) {
   return 0;
 }
 
+// what a joint is bowed by for each radian of a cube
+static double unit_of(const cav_joint *joint) {
+  static const double third = 1.0 / 3;
+  if (joint->type != CAV_JOINT_SLIDE) return 1;
+  return joint->limited ? fmax(third, (joint->range[1] - joint->range[0]) / (2 * largest)) : third;
+}
+
 // the best of the ways of a cube into the strategy
 static cav_status search_cube(search *s, double size, cav_strategy *strategy) {
   // square roots of primes: even in as many dimensions as there are
@@ -81,8 +88,7 @@ static cav_status search_cube(search *s, double size, cav_strategy *strategy) {
     double square = 0;
     for (int i = 0; i < n; i++) {
       const double whole = k * sqrt(prime[i]), even = 2 * (whole - floor(whole)) - 1;
-      const double unit = s->bowed.model->joint[s->bowed.swing[i].joint].type == CAV_JOINT_SLIDE ? 1.0 / 3 : 1;
-      s->bowed.swing[i].amplitude = size * unit * even;
+      s->bowed.swing[i].amplitude = size * unit_of(&s->bowed.model->joint[s->bowed.swing[i].joint]) * even;
       square += even * even;
     }
     if (square >= best) continue;

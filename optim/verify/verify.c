@@ -12,7 +12,7 @@
 
 /// What was found at the knots.
 typedef struct metrics {
-  cav_metric unactuated, limit, term, penetration, between, defect, periodicity, hover;
+  cav_metric unactuated, mirrored, limit, term, penetration, between, defect, periodicity, hover;
   double hover_self; // fraction of hover between links of one tree
   cav_slip slip;
   cav_rates rates;
@@ -162,7 +162,11 @@ static cav_status examine_image(const cav_verification *verification, int t, dou
   if (status != CAV_OK) return status;
   note_ranges(verification, t, q, suffix, found);
   cav_verification_penetration(verification, t, suffix, &found->penetration);
-  if (t < verification->rows) note_forces(verification, t, v, u, control, scratch, suffix, found);
+  if (t >= verification->rows) return CAV_OK;
+  metrics apart = {.unactuated = found->mirrored, .limit = found->mirrored};
+  const int uneven = cav_cycle_image_unevenness(verification->image) > 0;
+  note_forces(verification, t, v, u, control, scratch, suffix, uneven ? &apart : found);
+  if (uneven) found->mirrored = apart.unactuated.value > apart.limit.value ? apart.unactuated : apart.limit;
   return CAV_OK;
 }
 
@@ -278,6 +282,9 @@ static void decide(const cav_verification *verification, const metrics *found, c
   }
   require(verdict, &found->unactuated, CAV_TOLERANCE_UNACTUATED, "unactuated force, fraction of weight,",
           "More iterations, a longer motion or a start nearer to balance usually help.");
+  require(verdict, &found->mirrored, CAV_TOLERANCE_MIRRORED,
+          "unactuated force in the mirrored half stride, fraction of weight, or of a limit beyond it,",
+          "The model is not enough its own mirror image: a whole stride, without mirror, needs no such image.");
   if (!isnan(verdict->residual_within))
     require(verdict, &found->residual.worst, verdict->residual_within, "residual force on a root, fraction of weight,",
             "A lower 'force' or 'torque' of <residual> makes it more expensive; 'within' says how much is allowed.");
@@ -364,6 +371,9 @@ static void fill(const cav_verification *verification, const metrics *found, con
   verdict->model_contacts_seconds = replay->own.seconds;
   verdict->model_contacts_end_error_m = replay->own.error;
   verdict->periodicity_error = found->periodicity.value;
+  verdict->mirrored_force_max = NAN;
+  if (verification->image && cav_cycle_image_unevenness(verification->image) > 0)
+    verdict->mirrored_force_max = found->mirrored.value;
   verdict->periods = verification->periods;
   verdict->duration = verification->last * verification->h;
 }

@@ -232,6 +232,7 @@ static void leave_unverified(const cav_solution *solution, cav_verdict *v) {
                              &v->closed_loop_end_error_m,
                              &v->model_contacts_seconds,
                              &v->periodicity_error,
+                             &v->mirrored_force_max,
                              &v->push_survived_n_s,
                              &v->model_contacts_end_error_m,
                              &v->end_speed_m_s,
