@@ -487,18 +487,13 @@ static cav_status iterate(cav_solve_run *run, descent *d, int *taken) {
   return d->age < 0 && !is_lost(run, d) ? renew(run, d, 1, taken) : CAV_OK;
 }
 
-/// How far rows are off at the last values.
-static double rows_off(const cav_transcription *tr) {
-  return fmax(cav_transcription_unactuated(tr, NULL), cav_transcription_violation(tr));
-}
-
 /// Brings rows in that are still off by what is not linear in them, along the last programme's metric.
 static cav_status settle_rows(cav_solve_run *run, descent *d) {
   cav_transcription *tr = run->tr;
   cav_status status = CAV_OK;
   double worst = INFINITY;
   for (int i = 0; i < SETTLING && status == CAV_OK; i++) {
-    const double is = rows_off(tr);
+    const double is = cav_run_rows_off(run);
     if (!(is < 0.5 * worst) || is < 0.01 * run->options->tolerance) break;
     worst = is;
     for (int t = 0, k = 0; t < tr->nknot; t++)
@@ -510,7 +505,7 @@ static cav_status settle_rows(cav_solve_run *run, descent *d) {
     cav_transcription_move(tr, run->at, d->x, run->spare);
     double merit;
     status = try_at(run, d, run->spare, &merit);
-    int nearer = isfinite(merit) && rows_off(tr) < is;
+    int nearer = isfinite(merit) && cav_run_rows_off(run) < is;
     if (nearer) cav_run_exchange(&run->at, &run->spare);
     if (!nearer && status == CAV_OK) status = cav_transcription_values(tr, run->at);
   }
@@ -612,7 +607,7 @@ static cav_status look(cav_solve_run *run, descent *d, tail *end) {
 /// Keeps the motion where its rows hold, or are as near as a certificate asks; until there is one, where they nearly do.
 static cav_status hold(const cav_solve_run *run, descent *d) {
   int holds = cav_run_certifiable(run);
-  const double most = rows_off(run->tr);
+  const double most = cav_run_rows_off(run);
   if (!holds && (d->holds || most > nearly)) return CAV_OK;
   d->holds = holds;
   cav_trajectory_free(d->held);
@@ -659,7 +654,7 @@ static cav_status go_back(cav_solve_run *run, descent *d) {
 
 /// Asks once, where rows first nearly hold, whether a certificate would refuse the motion; the run ends there if they come in.
 static cav_status screen(cav_solve_run *run, descent *d) {
-  if (!d->screens || rows_off(run->tr) > nearly) return CAV_OK;
+  if (!d->screens || cav_run_rows_off(run) > nearly) return CAV_OK;
   d->screens = 0;
   cav_status status = cav_run_screen(run);
   if (status != CAV_OK || !run->refused) return status;
@@ -678,7 +673,7 @@ static cav_status screen(cav_solve_run *run, descent *d) {
 static cav_status settle(cav_solve_run *run, descent *d, int *left, int *settled) {
   int calm = 0, taken = 1;
   tail end = {0};
-  double off = rows_off(run->tr);
+  double off = cav_run_rows_off(run);
   // iterations left to bring rows in by half; 0: they came, or were in
   int away = off > astray ? ASTRAY : off > nearly ? HOPELESS : 0;
   cav_status status = CAV_OK;
@@ -691,8 +686,8 @@ static cav_status settle(cav_solve_run *run, descent *d, int *left, int *settled
     if (status == CAV_OK) status = hold(run, d);
     if (status == CAV_OK) status = screen(run, d);
     if (status == CAV_OK) status = look(run, d, &end);
-    const int nearer = away && rows_off(run->tr) < 0.5 * off;
-    if (nearer) off = rows_off(run->tr), away = off > astray ? ASTRAY : 0;
+    const int nearer = away && cav_run_rows_off(run) < 0.5 * off;
+    if (nearer) off = cav_run_rows_off(run), away = off > astray ? ASTRAY : 0;
     if (away && !nearer && !--away) break;
   }
   int ended = is_end(d, &end);
@@ -763,7 +758,7 @@ static cav_status run_of(cav_solve_run *run, int *left, double asked, double fra
   cav_trajectory *entry = cav_trajectory_copy(run->at);
   if (!entry) return CAV_NO_MEMORY;
   cav_status status = descent_new(&d, run) ? cav_transcription_values(run->tr, run->at) : CAV_NO_MEMORY;
-  const double off = rows_off(run->tr);
+  const double off = cav_run_rows_off(run);
   d.asked = asked;
   d.near = soft ? 0 : near_end * asked;
   d.patient = !stuck;
@@ -784,7 +779,7 @@ static cav_status run_of(cav_solve_run *run, int *left, double asked, double fra
   if (!cav_run_note(run, fraction, first, outcome)) status = CAV_NO_MEMORY;
   if (status == CAV_OK && !met && !soft) {
     // what nearly brings the rows in is nearer to the end than where it began
-    const double still = rows_off(run->tr);
+    const double still = cav_run_rows_off(run);
     const int better = still <= nearly && still <= brought_in * off;
     if (!better) cav_run_exchange(&run->at, &entry);
     if (!better) status = cav_transcription_values(run->tr, run->at);
