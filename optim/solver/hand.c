@@ -13,7 +13,6 @@
 #include "role.h"
 #include "schedule.h"
 #include "thing.h"
-#include "transcription.h"
 
 /// m: gap over the ground of what pushes.
 static const double clear = 0.005;

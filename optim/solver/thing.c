@@ -9,7 +9,6 @@
 #include "math3.h"
 #include "quantity.h"
 #include "role.h"
-#include "transcription.h"
 
 /// Weight of the terms that lead.
 static const double weight = 300;
