@@ -168,8 +168,8 @@ void cav_term_target(const cav_term *term, double time, int dim, double *target)
 
 int cav_term_asks(const cav_term *term) { return term->use != CAV_USE_COST || term->weight > 0; }
 
-int cav_term_places(const cav_model *model, const cav_term *term, int link) {
+int cav_term_placed(const cav_model *model, const cav_term *term) {
   const cav_sensor *s = &term->sensor;
-  return term->quantity == CAV_QUANTITY_SENSOR && s->type == CAV_SENSOR_FRAMEPOS && !s->referred &&
-         cav_object_link(model, s->object_type, s->object) == link;
+  const int is = term->quantity == CAV_QUANTITY_SENSOR && s->type == CAV_SENSOR_FRAMEPOS && !s->referred;
+  return is ? cav_object_link(model, s->object_type, s->object) : -1;
 }

@@ -49,7 +49,7 @@ void cav_term_target(const cav_term *term, double time, int dim, double *target)
 /// Whether a term asks for anything: it is no cost without a weight.
 int cav_term_asks(const cav_term *term);
 
-/// Whether a term is of the place of a link in the world.
-int cav_term_places(const cav_model *model, const cav_term *term, int link);
+/// The link whose place in the world a term is of, 0: the world; -1: it is of no place.
+int cav_term_placed(const cav_model *model, const cav_term *term);
 
 #endif
