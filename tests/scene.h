@@ -98,6 +98,8 @@ static inline double scene_uniform(void) {
   return 2.0 * (double)(scene_seed >> 11) / 9007199254740992.0 - 1.0;
 }
 
+static inline double scene_between(double low, double high) { return low + (high - low) * (scene_uniform() + 1) / 2; }
+
 /// About normal, variance one.
 static inline double scene_normal(void) {
   double sum = 0;

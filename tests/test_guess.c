@@ -1,11 +1,11 @@
 /// optim/solver/guess.c: the held start, the way from start to goal, postures on the way, turns, arcs and swings, each
-/// at its knots; and what a problem file may not ask of a guess.
+/// at its knots; what a problem file may not ask of a guess; and guesses that go round, under or over what is in the way.
 #include <unistd.h>
 
 #include "check.h"
 #include "clear.h"
 #include "continuation.h"
-#include "scene.h"
+#include "strategy.h"
 
 static char folder[] = "/tmp/cavort-guess-XXXXXX";
 static char path[128], model_path[128], motion_path[128];
@@ -259,6 +259,288 @@ static void check_broken(void) {
   refuse(HEAD "<guess type='hold'>\n<waypoint time='.5'/></guess>" TAIL, 6, "contradicts type='hold'");
 }
 
+// the problem of an arm from one side of something to the other
+static cav_problem *arm_past(const char *scene, const char *asked) {
+  static const char pattern[] =
+      "<problem name='past' model='" CAVORT_SOURCE_ROOT
+      "/problems/models/arm.xml'><scene>%s</scene><horizon duration='2.5' "
+      "timestep='0.02'/><start><joint name='joint1' degrees='-70'/><joint name='joint2' degrees='60'/><joint "
+      "name='joint4' degrees='40'/></start>"
+      "<goal><joint name='joint1' degrees='70'/><joint name='joint2' degrees='60'/><joint name='joint4' "
+      "degrees='40'/></goal>%s<cost><posture "
+      "dofs='all' at='end' weight='900'/><velocity dofs='all' at='end' weight='100'/></cost></problem>";
+  char text[1500];
+  snprintf(text, sizeof text, pattern, scene, asked);
+  return strategy_problem(text);
+}
+
+// an arm whose straight way runs into a wall or between posts is begun round them, clear of all, where its file has no guess;
+// what it does then is certified
+static void check_detour(void) {
+  static const char *const scene[] = {"<geom name='wall' type='box' pos='.45 0 .25' size='.2 .02 .25'/>",
+                                      "<geom name='one' type='cylinder' pos='.4 .15 .35' size='.03 .35'/><geom "
+                                      "name='two' type='cylinder' pos='.4 -.15 .35' "
+                                      "size='.03 .35'/>",
+                                      ""};
+  for (int k = 0; k < 3; k++) {
+    cav_problem *p = arm_past(scene[k], ""),
+                *stated = arm_past(scene[k],
+                                   "<guess><waypoint time='1'><joint name='joint2' degrees='20'/></waypoint></guess>");
+    if (!p || !stated) return;
+    cav_strategy strategy[CAV_STRATEGIES];
+    cav_error error = {0};
+    int n;
+    CHECK(cav_strategy_list(stated, strategy, &n) == CAV_OK && strategy[0].stated && !strategy[0].nswing);
+    cav_strategies_clear(strategy, n);
+    CHECK(cav_strategy_list(p, strategy, &n) == CAV_OK && (strategy[0].nswing == 7) == (k < 2));
+    // nearer to the goal's posture, by the same guess
+    const cav_strategy *posture = strategy_find(strategy, n, "posture");
+    if (CHECK(posture && posture->nterm == p->nterm && posture->nswing == strategy[0].nswing)) {
+      int heavier = 0;
+      for (int i = 0; i < p->nterm; i++) heavier += posture->term[i].weight == 10 * p->term[i].weight;
+      CHECK(heavier == 1);
+      CHECK_TEXT(posture->changed, "<posture weight=\"1\"/>");
+    }
+    if (k < 2) {
+      cav_problem taken;
+      cav_strategy_apply(p, &strategy[0], &taken);
+      cav_trajectory *way = cav_trajectory_new(p->model, 126, p->timestep);
+      cav_state *state = cav_state_new(p->model);
+      CHECK(cav_guess_fill(&taken, p->q_goal, way) == CAV_OK);
+      for (int t = 0; t < way->nknot; t++) {
+        CHECK(cav_position(p->model, state, way->q + t * way->nq) == CAV_OK);
+        for (int i = 0; i < state->ncontact; i++) {
+          const cav_pair *pair = &p->model->pair[state->contact[i].pair];
+          // arm and scene
+          if (p->model->geom[pair->geom1].link != p->model->geom[pair->geom2].link) CHECK(state->contact[i].dist > 0);
+        }
+      }
+      cav_state_free(state);
+      cav_trajectory_free(way);
+      cav_solution *solution = NULL;
+      CHECK(cav_strategy_solve(p, &strategy[0], NULL, NULL, &solution, &error) == CAV_OK);
+      cav_verdict v;
+      if (CHECK(solution && solution->gain_q))
+        CHECK(cav_verify_solution(&taken, solution, &v, &error) == CAV_OK && v.certified && v.achieved);
+      cav_solution_free(solution);
+    }
+    cav_strategies_clear(strategy, n);
+    cav_problem_free(p), cav_problem_free(stated);
+  }
+}
+
+// a humanoid that goes 1.4 m straight on past something
+static cav_problem *walk_past(const char *scene) {
+  static const char pattern[] = "<problem name='past' model='" CAVORT_SOURCE_ROOT
+                                "/problems/models/humanoid.xml'><scene>%s</scene><horizon duration='3.5'/>"
+                                "<start key='stand' height='floor'/><goal key='stand' height='floor'><root pos='1.4 0 "
+                                "1.4'/></goal><cost><posture dofs='all' at='end' weight='900'/></cost></problem>";
+  char text[1500];
+  snprintf(text, sizeof text, pattern, scene);
+  return strategy_problem(text);
+}
+
+// what stands in the way on the ground and is as high as the body is gone round, by the nearer side and no further than is
+// needed, limbs swinging; what is low, hangs or is too wide is not
+static void check_bypass(void) {
+  static const struct {
+    const char *scene;
+    int round; // 1: to the right, -y
+  } c[] = {{"<geom name='post' type='cylinder' size='.08 .8' pos='.7 .05 .8'/>", 1},
+           {"<geom name='post' type='cylinder' size='.08 .2' pos='.7 .05 .2'/>", 0},
+           {"<geom name='post' type='cylinder' size='.08 .4' pos='.7 .05 1.2'/>", 0},
+           {"<geom name='wall' type='box' size='.05 3 .8' pos='.7 .05 .8'/>", 0},
+           {"<geom name='post' type='cylinder' size='.08 .8' pos='.7 1.5 .8'/>", 0}};
+  for (size_t k = 0; k < sizeof c / sizeof *c; k++) {
+    cav_problem *p = walk_past(c[k].scene);
+    if (!p) return;
+    cav_strategy strategy[CAV_STRATEGIES];
+    int n;
+    CHECK(cav_strategy_list(p, strategy, &n) == CAV_OK);
+    CHECK((strategy[0].bow[1] < 0) == c[k].round && fabs(strategy[0].bow[0]) < 1e-12);
+    if (c[k].round) {
+      CHECK(!strategy[0].stated && strategy[0].nswing == 4 && strategy[0].schedule.solids == CAV_SOLIDS_HARD);
+      // the way of the root by itself: half a sine over the whole duration
+      cav_problem taken;
+      cav_strategy_apply(p, &strategy[0], &taken);
+      cav_error error = {0};
+      cav_trajectory *way = cav_problem_guess(&taken, &error);
+      cav_state *state = cav_state_new(p->model);
+      if (CHECK(way && state)) {
+        const double *middle = way->q + (size_t)(way->nknot / 2) * (size_t)way->nq;
+        CHECK_NEAR(middle[0], 0.7, 1e-9);
+        CHECK_NEAR(middle[1], strategy[0].bow[1], 1e-9);
+        // 8 cm of the post, and no more than shoulders need: 0.35 m
+        CHECK(hypot(middle[0] - 0.7, middle[1] - 0.05) > 0.08 + 0.2 && strategy[0].bow[1] > -0.5);
+        for (int t = 0; t < way->nknot; t++) {
+          CHECK(cav_position(p->model, state, way->q + (size_t)t * (size_t)way->nq) == CAV_OK);
+          for (int i = 0; i < state->ncontact; i++) {
+            const cav_contact *at = &state->contact[i];
+            const int geom = p->model->pair[at->pair].geom1;
+            if (at->link1 == 0 && p->model->geom[geom].type != CAV_GEOM_PLANE) CHECK(at->dist > 0.02);
+          }
+        }
+      }
+      cav_trajectory_free(way);
+      cav_state_free(state);
+    }
+    cav_strategies_clear(strategy, n);
+    cav_problem_free(p);
+  }
+}
+
+// what an arm's hand is asked for at the end, beyond a scene, and nothing else
+static cav_problem *hand_at(const char *scene, const char *more) {
+  static const char pattern[] =
+      "<problem name='at' model='" CAVORT_SOURCE_ROOT
+      "/problems/models/arm.xml'><scene>%s</scene><horizon duration='2.5' timestep='0.02'/>"
+      "<start><joint name='joint1' degrees='-50'/><joint name='joint2' degrees='60'/><joint name='joint4' "
+      "degrees='40'/>"
+      "<joint name='joint6' degrees='50'/></start><cost>"
+      "<sensor name='there' type='framepos' body='hand' target='.42 .25 .15' at='end' weight='3000'/>"
+      "<velocity dofs='all' at='end' weight='100'/>%s</cost></problem>";
+  char text[1500];
+  snprintf(text, sizeof text, pattern, scene, more);
+  return strategy_problem(text);
+}
+
+// on hands and knees under a beam, a little in it: a guess that is lifted out of solids stays below; under one on the ground,
+// which is a step, it is lifted over
+static void check_under(void) {
+  static const char pattern[] =
+      "<problem name='under' model='" CAVORT_SOURCE_ROOT
+      "/problems/models/humanoid.xml'><scene><geom name='beam' type='box' size='.08 1 %g' pos='.8 0 %g'/></scene>"
+      "<horizon duration='4'/><start key='all-fours' height='floor'/><goal key='all-fours' height='floor'><root "
+      "pos='1.5 0 "
+      ".5'/></goal><cost><posture dofs='all' at='end' weight='900'/></cost><schedule solids='grow'/></problem>";
+  for (int k = 0; k < 2; k++) {
+    char text[1500];
+    cav_error error = {0};
+    const double bottom = k ? 0 : 0.7, top = 0.8;
+    snprintf(text, sizeof text, pattern, (top - bottom) / 2, (top + bottom) / 2);
+    cav_problem *p = strategy_problem(text);
+    cav_trajectory *way = p ? cav_problem_guess(p, &error) : NULL;
+    if (CHECK(way != NULL)) {
+      double most = 0;
+      for (int t = 0; t < way->nknot; t++) most = fmax(most, way->q[(size_t)t * (size_t)way->nq + 2]);
+      CHECK(k ? most > p->q_start[2] + 0.5 : most < p->q_start[2] + 0.05);
+    }
+    cav_trajectory_free(way);
+    cav_problem_free(p);
+  }
+}
+
+// standing before a beam at the height of the chest the guess ducks: deep enough, and back up
+static void check_duck(void) {
+  cav_error error = {0};
+  cav_problem *p = cav_problem_load(CAVORT_SOURCE_ROOT "/tests/unseen/duck.xml", NULL, &error);
+  if (!CHECK(p != NULL)) return;
+  p->schedule.solids = CAV_SOLIDS_GROW;
+  cav_trajectory *way = cav_problem_guess(p, &error);
+  cav_state *state = cav_state_new(p->model);
+  if (CHECK(way != NULL)) {
+    double least = INFINITY, most = 0, in = 0;
+    for (int t = 0; t < way->nknot; t++) {
+      const double *q = way->q + (size_t)t * (size_t)way->nq;
+      least = fmin(least, q[2]), most = fmax(most, q[2]);
+      CHECK(cav_position(p->model, state, q) == CAV_OK);
+      for (int i = 0; i < state->ncontact; i++) {
+        const cav_contact *c = &state->contact[i];
+        const int beam = p->model->geom[p->model->pair[c->pair].geom1].type == CAV_GEOM_CAPSULE;
+        if (beam && (c->link1 == 0 || c->link2 == 0)) in = fmax(in, -c->dist);
+      }
+    }
+    CHECK(least < p->q_start[2] - 0.3 && most < p->q_start[2] + 0.01 && in < 0.002);
+    CHECK_NEAR(way->q[(size_t)(way->nknot - 1) * (size_t)way->nq + 2], p->q_start[2], 0.01);
+  }
+  cav_state_free(state);
+  cav_trajectory_free(way);
+  cav_problem_free(p);
+}
+
+// a file without a goal whose hand is wanted behind a wall is begun by a posture that has it there, round the wall, clear of
+// all; nothing of that where the straight way there is free, or the start's posture is asked for at the end too
+static void check_reach(void) {
+  static const char wall[] = "<geom name='wall' type='box' pos='.45 0 .25' size='.2 .02 .25'/>";
+  static const struct {
+    const char *scene, *more;
+    int reaches;
+  } c[] = {{wall, "", 1},
+           {"", "", 0},
+           {wall, "<posture dofs='joints' at='end' weight='10'/>", 0},
+           {wall, "<posture dofs='joints' at='end' weight='10' within='any'/>", 1}};
+  for (size_t k = 0; k < sizeof c / sizeof *c; k++) {
+    cav_problem *p = hand_at(c[k].scene, c[k].more);
+    if (!p) return;
+    cav_strategy strategy[CAV_STRATEGIES];
+    cav_error error = {0};
+    int n;
+    CHECK(cav_strategy_list(p, strategy, &n) == CAV_OK && (strategy[0].nreach == 7) == c[k].reaches);
+    CHECK(!strategy_find(strategy, n, "hold") == !c[k].reaches);
+    if (k == 0 && strategy[0].nreach) {
+      // where the hand is there, by the model alone
+      double q[16];
+      cav_pose at;
+      cav_state *state = cav_state_new(p->model);
+      memcpy(q, p->q_start, (size_t)p->model->nq * sizeof *q);
+      for (int i = 0; i < strategy[0].nreach; i++) {
+        const cav_joint *joint = &p->model->joint[strategy[0].reach[i].joint];
+        q[joint->q] = strategy[0].reach[i].to;
+        CHECK(!joint->limited || (q[joint->q] > joint->range[0] && q[joint->q] < joint->range[1]));
+      }
+      CHECK(cav_position(p->model, state, q) == CAV_OK);
+      const cav_term *there = &p->term[0];
+      for (int i = 0; i < p->nterm && strcmp(there->name, "there"); i++) there = &p->term[i];
+      cav_object_pose(p->model, state, there->sensor.object_type, there->sensor.object, &at);
+      CHECK(hypot(hypot(at.pos[0] - 0.42, at.pos[1] - 0.25), at.pos[2] - 0.15) < 0.03);
+      for (int i = 0; i < state->ncontact; i++) CHECK(state->contact[i].dist > 0);
+      cav_state_free(state);
+      cav_solution *solution = NULL;
+      cav_verdict v;
+      CHECK(cav_strategy_solve(p, &strategy[0], NULL, NULL, &solution, &error) == CAV_OK);
+      if (CHECK(solution && solution->gain_q))
+        CHECK(cav_verify_solution(p, solution, &v, &error) == CAV_OK && v.certified && v.achieved);
+      cav_solution_free(solution);
+    }
+    cav_strategies_clear(strategy, n);
+    cav_problem_free(p);
+  }
+}
+
+// a finger that no actuator moves, and that the model has at the end of its range, is no hindrance
+static void check_reach_with_finger(void) {
+  static const char arm[] =
+      "<mujoco><worldbody><body pos='0 0 .3'><joint name='a' axis='0 0 1'/><geom type='capsule' fromto='0 0 0 .3 0 0' "
+      "size='.03'/>"
+      "<body pos='.3 0 0'><joint name='b' axis='0 0 1'/><geom type='capsule' fromto='.06 0 0 .3 0 0' size='.03'/>"
+      "<body pos='.3 0 0'><joint name='c' axis='0 1 0'/><geom type='capsule' fromto='.06 0 0 .2 0 0' size='.02'/>"
+      "<site name='tip' pos='.22 0 0'/>"
+      "<body pos='.2 .03 0'><joint name='finger' type='slide' axis='0 1 0' range='0 .05' limited='true'/>"
+      "<geom size='.005' mass='.01' contype='0' conaffinity='0'/></body></body></body></body></worldbody>"
+      "<actuator><motor joint='a' ctrllimited='true' ctrlrange='-20 20'/><motor joint='b' ctrllimited='true' "
+      "ctrlrange='-20 20'/>"
+      "<motor joint='c' ctrllimited='true' ctrlrange='-20 20'/></actuator></mujoco>";
+  static const char problem[] =
+      "<problem name='finger' model='m.xml'><scene><geom name='post' type='cylinder' pos='.5 0 .3' size='.04 "
+      ".3'/></scene>"
+      "<horizon duration='2' timestep='0.02'/><start><joint name='a' degrees='-60'/></start><cost>"
+      "<sensor name='there' type='framepos' site='tip' target='.5 .4 .3' at='end' within='.1' weight='3000'/>"
+      "<velocity dofs='all' at='end' weight='100'/></cost></problem>";
+  scene_write(folder, "m.xml", arm);
+  scene_write(folder, "p.xml", problem);
+  cav_error error = {0};
+  cav_problem *p = cav_problem_load(path, NULL, &error);
+  if (CHECK(p != NULL)) {
+    cav_strategy strategy[CAV_STRATEGIES];
+    int n;
+    CHECK(cav_strategy_list(p, strategy, &n) == CAV_OK && strategy[0].nreach == 3);
+    for (int k = 0; k < strategy[0].nreach; k++)
+      CHECK(strcmp(p->model->joint[strategy[0].reach[k].joint].name, "finger"));
+    cav_strategies_clear(strategy, n);
+  }
+  cav_problem_free(p);
+}
+
 int main(void) {
   CHECK(mkdtemp(folder) != NULL);
   snprintf(path, sizeof path, "%s/p.xml", folder);
@@ -271,6 +553,12 @@ int main(void) {
   check_broken();
   check_file();
   check_solids();
+  check_detour();
+  check_bypass();
+  check_under();
+  check_duck();
+  check_reach();
+  check_reach_with_finger();
   unlink(path);
   unlink(model_path);
   rmdir(folder);

@@ -9,8 +9,8 @@
 
 #include "carry.h"
 #include "cavort/cavort.h"
-#include "check.h"
 #include "hand.h"
+#include "strategy.h"
 
 static cav_problem *load(const char *name) {
   char path[300];
@@ -69,12 +69,6 @@ static void test_components(void) {
   cav_problem_free(p);
 }
 
-static const cav_strategy *find(const cav_strategy *strategy, int n, const char *name) {
-  for (int i = 0; i < n; i++)
-    if (!strcmp(strategy[i].name, name)) return &strategy[i];
-  return NULL;
-}
-
 static void test_pushed(const char *name, const char *by, double most) {
   cav_problem *p = load(name);
   if (!p) return;
@@ -84,7 +78,7 @@ static void test_pushed(const char *name, const char *by, double most) {
   cav_error error = {0};
   int n;
   CHECK(cav_strategy_list(p, strategy, &n) == CAV_OK);
-  const cav_strategy *push = find(strategy, n, by);
+  const cav_strategy *push = strategy_find(strategy, n, by);
   // a hand leads it, also where it is what a file without a guess is begun with; one with a guess is begun by that
   CHECK(push && push->hand > 0);
   if (push == &strategy[0]) {
@@ -93,10 +87,10 @@ static void test_pushed(const char *name, const char *by, double most) {
     cav_problem held = *p;
     held.guess = CAV_GUESS_HOLD;
     const char *led = push->hand == 2 ? "carry" : "push";
-    CHECK(cav_strategy_list(&held, other, &m) == CAV_OK && !other[0].hand && find(other, m, led));
+    CHECK(cav_strategy_list(&held, other, &m) == CAV_OK && !other[0].hand && strategy_find(other, m, led));
     cav_strategies_clear(other, m);
     // what leads no hand is tried later
-    CHECK(!find(strategy, n, led) && find(strategy, n, "line"));
+    CHECK(!strategy_find(strategy, n, led) && strategy_find(strategy, n, "line"));
   }
   if (push) CHECK(cav_strategy_solve(p, push, NULL, NULL, &s, &error) == CAV_OK);
   // its terms are no part of the problem: the cost is that of the file's own
@@ -225,8 +219,8 @@ static void test_begun(void) {
     if (!CHECK(p != NULL)) continue;
     CHECK(cav_strategy_list(p, strategy, &n) == CAV_OK);
     CHECK(strategy[0].hand == (told ? 0 : 2) && !strcmp(strategy[0].name, "stated"));
-    const cav_strategy *carry = find(strategy, n, "carry");
-    CHECK(told ? carry && carry->hand == 2 : !carry && find(strategy, n, "line"));
+    const cav_strategy *carry = strategy_find(strategy, n, "carry");
+    CHECK(told ? carry && carry->hand == 2 : !carry && strategy_find(strategy, n, "line"));
     cav_strategies_clear(strategy, n);
     cav_problem_free(p);
   }

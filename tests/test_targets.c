@@ -2,8 +2,8 @@
 /// postures; as costs and as constraints; between rows; in results as waypoints; and what is wrong with a table, with
 /// both files' lines.
 #include "cavort/cavort.h"
+#include "quantity.h"
 #include "scene.h"
-#include "transcription.h"
 
 static const char model[] =
     "<mujoco><worldbody><body name='arm' pos='0 0 1'><joint name='a' axis='0 1 0'/><geom type='capsule' size='.05' "

@@ -24,6 +24,7 @@
 #include "math3.h"
 #include "objects.h"
 #include "problem_file.h"
+#include "quantity.h"
 #include "transcription.h"
 
 /// A contact counts as deep where planning would not have left it.

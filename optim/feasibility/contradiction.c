@@ -6,8 +6,8 @@
 
 #include "feasibility.h"
 #include "math3.h"
+#include "quantity.h"
 #include "rotation.h"
-#include "transcription.h"
 
 static const double slack = 1e-6; // m or rad, beyond tolerances: what a certificate leaves room for
 

@@ -12,7 +12,6 @@
 #include "objects.h"
 #include "problem_file.h"
 #include "quantity.h"
-#include "transcription.h"
 
 static const double near_knot = 1e-6; // of a step
 enum { MOST_KNOTS = 256 };            // of a window

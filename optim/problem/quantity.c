@@ -151,10 +151,25 @@ int cav_term_target_length(const cav_model *model, const cav_term *term) {
   return 0;
 }
 
+void cav_term_target(const cav_term *term, double time, int dim, double *target) {
+  if (!term->target) {
+    memset(target, 0, (size_t)dim * sizeof(double));
+  } else if (term->nwaypoint == 0) {
+    memcpy(target, term->target, (size_t)dim * sizeof(double));
+  } else {
+    int n = term->nwaypoint, i = 0;
+    while (i < n - 2 && time > term->waypoint_time[i + 1]) i++;
+    int j = i + 1 < n ? i + 1 : i;
+    double span = term->waypoint_time[j] - term->waypoint_time[i];
+    double s = span > 0 ? fmin(fmax((time - term->waypoint_time[i]) / span, 0), 1) : 0;
+    for (int k = 0; k < dim; k++) target[k] = (1 - s) * term->target[i * dim + k] + s * term->target[j * dim + k];
+  }
+}
+
 int cav_term_asks(const cav_term *term) { return term->use != CAV_USE_COST || term->weight > 0; }
 
-int cav_term_places(const cav_model *model, const cav_term *term, int link) {
+int cav_term_placed(const cav_model *model, const cav_term *term) {
   const cav_sensor *s = &term->sensor;
-  return term->quantity == CAV_QUANTITY_SENSOR && s->type == CAV_SENSOR_FRAMEPOS && !s->referred &&
-         cav_object_link(model, s->object_type, s->object) == link;
+  const int is = term->quantity == CAV_QUANTITY_SENSOR && s->type == CAV_SENSOR_FRAMEPOS && !s->referred;
+  return is ? cav_object_link(model, s->object_type, s->object) : -1;
 }

@@ -43,10 +43,13 @@ int cav_term_has_dofs(const cav_term *term);
 /// Numbers of a term's target, components that it may pick; 0: it has one number for all that it is of.
 int cav_term_target_length(const cav_model *model, const cav_term *term);
 
+/// Target of a term at a time, dim numbers: constant, between waypoints, or zeros.
+void cav_term_target(const cav_term *term, double time, int dim, double *target);
+
 /// Whether a term asks for anything: it is no cost without a weight.
 int cav_term_asks(const cav_term *term);
 
-/// Whether a term is of the place of a link in the world.
-int cav_term_places(const cav_model *model, const cav_term *term, int link);
+/// The link whose place in the world a term is of, 0: the world; -1: it is of no place.
+int cav_term_placed(const cav_model *model, const cav_term *term);
 
 #endif

@@ -158,10 +158,12 @@ static int is_hopeless(const cav_solve_run *run, double fraction, cav_outcome ou
          cav_transcription_unactuated(run->tr, NULL) > hopeless;
 }
 
-/// Whether a stage that stalls has done what it is for: its rows are nearly in, and the next law moves the jump that holds it.
-static int stage_stands(const cav_solve_run *run) {
-  return fmax(cav_transcription_unactuated(run->tr, NULL), cav_transcription_violation(run->tr)) < stands;
+double cav_run_rows_off(const cav_solve_run *run) {
+  return fmax(cav_transcription_unactuated(run->tr, NULL), cav_transcription_violation(run->tr));
 }
+
+/// Whether a stage that stalls has done what it is for: its rows are nearly in, and the next law moves the jump that holds it.
+static int stage_stands(const cav_solve_run *run) { return cav_run_rows_off(run) < stands; }
 
 cav_status cav_stage_run(cav_solve_run *run, double fraction, cav_outcome *outcome) {
   cav_stage_options stage = cav_schedule_at(&run->problem->schedule, fraction);

@@ -155,6 +155,9 @@ int cav_run_met(const cav_solve_run *run);
 int cav_run_weighed_met(const cav_solve_run *run);
 int cav_run_exact(const cav_solve_run *run);
 
+/// How far rows are off at the last values: the largest unactuated force or violation.
+double cav_run_rows_off(const cav_solve_run *run);
+
 /// Appends a line to the log and tells the observer; nonzero if it asks to stop. Region's report.
 int cav_run_report(void *run, double step, double radius);
 

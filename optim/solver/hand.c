@@ -14,7 +14,6 @@
 #include "role.h"
 #include "schedule.h"
 #include "thing.h"
-#include "transcription.h"
 
 /// m: gap over the ground of what pushes.
 static const double clear = 0.005;
@@ -137,7 +136,7 @@ static int place_asked(const cav_problem *p, const touched *t, int link, double 
     const cav_term *term = &p->term[i];
     const double to = term->to < 0 ? p->duration : term->to;
     double target[CAV_SENSOR_DIM_MAX];
-    if (term->use == CAV_USE_RANGE || !cav_term_places(p->model, term, link)) continue;
+    if (term->use == CAV_USE_RANGE || cav_term_placed(p->model, term) != link) continue;
     if (term->from > t->to || to < t->from) continue;
     cav_term_target(term, fmin(to, t->to), 3, target);
     for (int k = 0; k < 3; k++)

@@ -615,7 +615,7 @@ static int is_exact(const cav_solve_run *run) {
 /// Largest violation of all rows at run->at, with its costs.
 static cav_status measure(cav_solve_run *run, double *violation, double *cost) {
   cav_status status = cav_transcription_values(run->tr, run->at);
-  *violation = fmax(cav_transcription_unactuated(run->tr, NULL), cav_transcription_violation(run->tr));
+  *violation = cav_run_rows_off(run);
   *cost = cav_transcription_cost(run->tr);
   return status;
 }

@@ -10,7 +10,7 @@
 #include "clear.h"
 #include "continuation.h"
 #include "math3.h"
-#include "transcription.h"
+#include "quantity.h"
 
 static const double least_rise = 0.05; // m: less is done by stretching
 

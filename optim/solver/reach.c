@@ -13,7 +13,6 @@
 #include "posture_search.h"
 #include "problem_file.h"
 #include "quantity.h"
-#include "transcription.h"
 
 enum { TRIES = 32, KEPT = 3 };
 static const double spread = 2; // rad, largest offset from the start that a search begins at; of slides half of it in m

@@ -1,41 +1,23 @@
 /// Sequential quadratic programming on a transcription: from near an optimum to stationarity, all constraints held at
-/// once, in the metric of the Lagrangian's Hessian.
+/// once, in the metric of the Lagrangian's Hessian. The steps are those of descent.c; here is when a run of them ends, which
+/// motion it leaves, and how optimal that is.
 ///
-/// Each iteration solves the programme of quadratic.c in a box, whose rows have exact penalties (Fletcher 1985:
-/// S-l1-QP), and takes its step where cost plus penalties fall by a fraction of what the programme predicted; a step
-/// that misses the rows by their curvature is corrected in the same metric (Maratos). Penalties are above every
-/// multiplier, row by row. Every knot has a box of its own: merit and prediction are sums over knots, so what a step
-/// misses is known by knot, and one at which a contact comes or goes does not hold the others back. The Hessian is
-/// Gauss-Newton's at first, then the Lagrangian's, found anew at knots that miss. The end is where the programme of a
-/// Hessian found there predicts next to nothing: its prediction over the cost is how optimal the motion is, in the full
-/// box; or where little is left to be saved and that comes slowly.
+/// The end is where the programme of a Hessian found there predicts next to nothing: its prediction over the cost is how
+/// optimal the motion is, in the full box; or where little is left to be saved and that comes slowly. A run that ends
+/// beside its rows goes back to where they last held.
 #include "sqp.h"
 
 #include <math.h>
-#include <stdlib.h>
-#include <string.h>
 
-#include "course.h"
-#include "curvature.h"
+#include "descent.h"
 #include "programme.h"
 
-/// Iterations at a softer law on the way; programmes for a linearisation; corrections of a step.
-enum { SOFT_ITERATIONS = 40, ATTEMPTS = 20, CORRECTIONS = 16, SETTLING = 20 };
+/// Iterations at a softer law on the way.
+enum { SOFT_ITERATIONS = 40 };
 
-/// Boxes at the start and at most (rad, m, log of the step), and where they are too small to go on.
-static const double first_radius = 0.1, most_radius = 0.7, least_radius = 1e-7;
-
-/// Fractions of the cost: predicted decrease that ends a run; one that ends it if it does not come true.
-static const double stationary = 1e-9, predicted_enough = 1e-6;
-
-/// Decreases of the cost below this fraction, so many in a row, end a run; below that a Hessian that served so many
-/// iterations is found anew.
-static const double slow = 1e-6, old_gain = 1e-5;
-enum { PATIENCE = 8, SERVED = 5 };
-
-/// So many steps in a row by Gauss-Newton's model that gain less than this fraction of the cost end its part.
-static const double gauss_newton = 1e-4;
-enum { FEW = 3 };
+/// Decreases of the cost below this fraction, so many in a row, end a run.
+static const double slow = 1e-6;
+enum { PATIENCE = 8 };
 
 /// Iterations between two looks at what there is to be saved, and looks in a row that end a run; part of it that a step
 /// gains where progress is not slow, and where it is so slow that a run is stuck: that is its end too, where what is left
@@ -50,27 +32,9 @@ static const double near_end = 0.1;
 /// What may be left to be saved on the way, a fraction of the cost.
 static const double soft_optimality = 2e-3;
 
-/// What is optimal, as a fraction of the cost. Where it is not: steps across jumps of the merit, the boxes they are
-/// tried in, and what they may lose.
-static const double optimal = 1e-6, leap_box[] = {1e-2, 3e-3, 1e-3, 3e-4, 1e-4}, leap_loss = 1e-3;
-enum { LEAPS = 4, LEAP_BOXES = sizeof leap_box / sizeof *leap_box };
-
-/// How far the ratio of a decrease to what was predicted may be from 1 before the Hessian is found anew; how much of
-/// the decrease a knot has to miss for its box to be at fault instead.
-static const double poor_ratio = 0.4, far = 2;
-
-/// Parts of a step that are tried where it falls short, from which ratios of it on; from where it does not.
-static const double shorter[2][2] = {{0.5, -3}, {0.25, -20}}, enough_of_it = 0.5;
-
-/// Part of what a step misses that a correction has to bring for another one to follow.
-static const double worth = 0.1;
-
-/// Ratios to a forecast from which a step is lengthened: whatever it is; where the model itself goes on down along it,
-/// by this part of the decrease.
-static const double exceeded = 1.3, fair = 0.5, unfinished = 0.1;
-
-/// Part of what all knots' forecasts were off by that the knots whose curvature is kept may be off by.
-static const double unmarked = 0.3;
+/// What is optimal, as a fraction of the cost; where it is not so many steps across jumps of the merit are tried.
+static const double optimal = 1e-6;
+enum { LEAPS = 4 };
 
 /// What a motion whose rows hold may be dearer than where a run ends without that; rows that nearly hold; part of what they were
 /// off by before a run that nearly brings them in.
@@ -81,495 +45,6 @@ static const double held_loss = 1e-2, nearly = 1e-4, brought_in = 0.1;
 static const double astray = 1e-2;
 enum { HOPELESS = 60, ASTRAY = 40 };
 
-/// Squares of the step, rad or m, that make a programme convex, of the cost: of all knots, and of single ones.
-/// A wave of these takes what is within this fraction of the largest.
-static const double least_shift = 1, most_shift[2] = {10, 1e6}, most_knot_shift = 1e14, wave = 0.05;
-
-/// Sets aside the augmented Lagrangian, but for squares of the unactuated force: these leave the solution where it is,
-/// and make the Lagrangian convex across these rows.
-static void take_penalties(cav_transcription *tr) {
-  tr->penalty = (cav_penalties){.unactuated = tr->problem->schedule.last.penalty};
-  for (int t = 0; t < tr->nknot; t++)
-    for (int i = 0; i < tr->knot[t].layout.count; i++) tr->knot[t].slot[i].multiplier = 0;
-}
-
-/// A run of iterations: memory and the present state.
-typedef struct descent {
-  cav_quadratic *qp;
-  cav_curvature *curvature;
-  cav_course course;
-  double *x, *offset, *multiplier; ///< [unknowns], [rows], [rows]
-  double *kept;                    ///< [rows] penalties before a raise
-  int rest;                        ///< programmes in which no raise is tried
-  double *radius;                  ///< [blocks+1] box about the blocks of unknowns, then about the step's logarithm
-  double *before, *after, *tried; ///< [nknot] the knots' parts of the merit: here, at the step to take, at the last one
-  double *parts;                  ///< [nknot] of the whole step, while a part of it is tried
-  double *forecast, *next;        ///< [nknot] of the decrease; [blocks+1] boxes to come
-  double merit;
-  double predicted; ///< decrease, by the last programme
-  double ratio;     ///< of the decrease to it
-  int age;          ///< iterations since the curvature was found; -1: it was not
-  int whole;        ///< 1: at all knots
-  int few;          ///< Gauss-Newton's steps in a row that gained little
-  char *stale;      ///< [nknot] those that it is found at anew
-  double shift;     ///< what the squares of the unknowns cost besides
-  double *need;     ///< [nknot] what those of one knot would have to cost; 0: nothing, or they do
-  int needs_known;
-  double gain;                   ///< decrease of the step that was taken
-  double asked;                  ///< what may be left to be saved, of the cost
-  double at_least;               ///< what the last look found at least, finished or not
-  double near;                   ///< what is next to nothing; 0 on the way, where a law is left soon in any case
-  int screens;                   ///< 1: it is still to be asked whether a certificate would refuse the motion
-  int patient;                   ///< 1: being stuck is no end, unless little is left
-  cav_trajectory *second, *best; ///< corrected trial; best of those tried
-  cav_trajectory *held;          ///< last motion whose rows held, or nearly; NULL: none did
-  int holds;                     ///< 1: as a certificate asks
-  double held_cost;
-  const cav_trajectory *last; ///< what was evaluated last
-} descent;
-
-static void set_radius(const cav_transcription *tr, double *radius, double value) {
-  for (int b = 0; b <= cav_transcription_blocks(tr); b++) radius[b] = value;
-}
-
-static int descent_new(descent *d, cav_solve_run *run) {
-  *d = (descent){.qp = cav_quadratic_new(run->tr, run->normal), .ratio = 1, .age = -1};
-  size_t n = (size_t)cav_transcription_unknowns(run->tr), rows = d->qp ? (size_t)cav_quadratic_rows(d->qp) : 0;
-  d->curvature = cav_curvature_new(run->tr);
-  d->stale = malloc((size_t)run->tr->nknot);
-  int whole = d->qp && cav_course_make(&d->course, run->tr, (int)rows);
-  size_t knots = (size_t)run->tr->nknot, boxes = (size_t)cav_transcription_blocks(run->tr) + 1;
-  d->x = calloc(n + 3 * rows + 6 * knots + 2 * boxes, sizeof(double));
-  d->second = cav_trajectory_copy(run->at);
-  d->best = cav_trajectory_copy(run->at);
-  if (!whole || !d->curvature || !d->stale || !d->x || !d->second || !d->best || !cav_transcription_keep_rows(run->tr))
-    return 0;
-  d->offset = d->x + n;
-  d->multiplier = d->offset + rows;
-  d->kept = d->multiplier + rows;
-  d->radius = d->kept + rows;
-  d->before = d->radius + boxes;
-  d->after = d->before + knots;
-  d->tried = d->after + knots;
-  d->forecast = d->tried + knots;
-  d->next = d->forecast + knots;
-  d->need = d->next + boxes;
-  d->parts = d->need + knots;
-  set_radius(run->tr, d->radius, first_radius);
-  return 1;
-}
-
-static void descent_free(descent *d) {
-  cav_quadratic_free(d->qp);
-  cav_curvature_free(d->curvature);
-  cav_course_clear(&d->course);
-  cav_trajectory_free(d->second);
-  cav_trajectory_free(d->best);
-  cav_trajectory_free(d->held);
-  free(d->x), free(d->stale);
-}
-
-/// Changes what all unknowns' own squares cost besides.
-static void shift_all(const cav_transcription *tr, descent *d, double next) {
-  size_t nv = (size_t)tr->nv, width = 3 * nv;
-  for (int t = 0; t < tr->nknot; t++)
-    for (size_t i = t + tr->first < 0 ? 0 : nv; i < 2 * nv; i++) tr->knot[t].hessian[i * width + i] += next - d->shift;
-  d->shift = next;
-}
-
-/// What each knot's part needs to be convex by itself.
-static void find_needs(const cav_transcription *tr, descent *d) {
-  double least = least_shift * cav_programme_scale(tr);
-  for (int t = 0; t < tr->nknot; t++) {
-    d->need[t] = 0;
-    while (d->need[t] < most_knot_shift * least && !cav_quadratic_knot_convex(d->qp, t, d->need[t]))
-      d->need[t] = d->need[t] > 0 ? 10 * d->need[t] : least;
-  }
-  d->needs_known = 1;
-}
-
-/// Makes the model more convex: by squares of all unknowns; then, in their place, by those of the knots that need most,
-/// where a contact comes or goes, and of more and more knots; then by those of all beside. 0: there is no more to be
-/// had.
-static int raise_shift(const cav_transcription *tr, descent *d) {
-  double least = least_shift * cav_programme_scale(tr);
-  if (!d->needs_known && d->shift < most_shift[0] * least) {
-    shift_all(tr, d, d->shift > 0 ? 10 * d->shift : least);
-    return 1;
-  }
-  if (!d->needs_known) {
-    shift_all(tr, d, 0);
-    find_needs(tr, d);
-  }
-  int width = 3 * tr->nv;
-  double most = 0;
-  for (int t = 0; t < tr->nknot; t++) most = fmax(most, d->need[t]);
-  if (most == 0) {
-    if (d->shift >= most_shift[1] * least) return 0;
-    shift_all(tr, d, d->shift > 0 ? 10 * d->shift : most_shift[0] * least);
-    return 1;
-  }
-  for (int t = 0; t < tr->nknot; t++) {
-    if (d->need[t] < wave * most) continue;
-    for (int i = 0; i < width; i++) tr->knot[t].hessian[i * width + i] += d->need[t];
-    d->need[t] = 0;
-  }
-  return 1;
-}
-
-/// Adds the Lagrangian's curvature to the linearisation, with squares of the step that make it convex along the rows
-/// that hold the motion.
-static void add_curvature(cav_solve_run *run, descent *d) {
-  cav_curvature_add(d->curvature, run->tr, 1);
-  d->shift = 0;
-  d->needs_known = 0;
-  while (!cav_quadratic_convex(d->qp) && raise_shift(run->tr, d)) continue;
-}
-
-/// Solves the model in a box, with more and more squares until that can be done.
-static cav_status solve_model(cav_solve_run *run, descent *d) {
-  for (;;) {
-    int solved = 0;
-    cav_status status = cav_programme_solve(run, d->qp, d->radius, d->kept, &d->rest, &solved);
-    if (status != CAV_OK || solved || !raise_shift(run->tr, d)) return status;
-  }
-}
-
-/// What a knot's part of the merit misses of its forecast.
-static double missed(const descent *d, int t) {
-  return isfinite(d->after[t]) ? d->forecast[t] - (d->before[t] - d->after[t]) : INFINITY;
-}
-
-/// Marks the knots whose forecasts were off most: all but those that together are off by a small part of what all are.
-static void mark_stale(const cav_transcription *tr, descent *d) {
-  double all = 0, left = 0, next = 0;
-  for (int t = 0; t < tr->nknot; t++) all += fmin(fabs(missed(d, t)), fabs(d->predicted));
-  memset(d->stale, 1, (size_t)tr->nknot);
-  // the least of the marked ones is next to go
-  for (;;) {
-    double least = INFINITY;
-    for (int t = 0; t < tr->nknot; t++)
-      if (d->stale[t]) least = fmin(least, fabs(missed(d, t)));
-    next = left + least;
-    if (!(next <= unmarked * all)) break;
-    for (int t = 0; t < tr->nknot; t++)
-      if (d->stale[t] && fabs(missed(d, t)) <= least) d->stale[t] = 0, left += least;
-  }
-}
-
-/// Costs, rows and their model at run->at: Gauss-Newton's while its steps gain, then with the Lagrangian's curvature,
-/// which is found anew where the last one's predictions have not come true. all: at all knots.
-static cav_status model(cav_solve_run *run, descent *d, int all) {
-  int poor = d->age >= 0 && fabs(d->ratio - 1) > poor_ratio;
-  int little = d->age >= SERVED && d->gain < old_gain * cav_programme_scale(run->tr);
-  cav_status status = CAV_OK;
-  if (poor || little || all || (d->age < 0 && d->few >= FEW)) {
-    int whole = !poor || little || all;
-    if (!whole) mark_stale(run->tr, d);
-    status = cav_curvature_find(d->curvature, run->tr, run->at, run->spare, d->multiplier, whole ? NULL : d->stale);
-    d->age = 0;
-    d->whole = whole;
-  } else {
-    status = cav_transcription_linearise(run->tr, run->at);
-    if (d->age >= 0) d->age++;
-    d->whole = 0;
-  }
-  d->shift = 0;
-  d->needs_known = 0;
-  if (status == CAV_OK && d->age >= 0) add_curvature(run, d);
-  return status;
-}
-
-/// Merit of a trajectory, infinite where it cannot be evaluated.
-static cav_status try_at(cav_solve_run *run, descent *d, cav_trajectory *at, double *merit) {
-  cav_status status = cav_transcription_values(run->tr, at);
-  d->last = at;
-  *merit = status == CAV_OK ? cav_programme_merit(run->tr, cav_quadratic_penalty(d->qp), d->tried) : INFINITY;
-  return status == CAV_NO_MEMORY || status == CAV_INTERRUPTED ? status : CAV_OK;
-}
-
-static void keep_parts(descent *d) {
-  double *kept = d->after;
-  d->after = d->tried;
-  d->tried = kept;
-}
-
-/// Evaluates a trajectory moved by x and takes it to run->spare where it is better than what is there. *better:
-/// whether it is.
-static cav_status try_better(cav_solve_run *run, descent *d, const cav_trajectory *from, const double *x, double *merit,
-                             int *better) {
-  double there;
-  cav_transcription_move(run->tr, from, x, d->second);
-  cav_status status = try_at(run, d, d->second, &there);
-  *better = there < *merit;
-  if (!*better) return status;
-  *merit = there;
-  cav_run_exchange(&run->spare, &d->second);
-  keep_parts(d);
-  return status;
-}
-
-/// Takes a multiple of the programme's step to run->spare; where that gains less than enough, with its bend, then corrected
-/// again and again, as long as that is better. Returns the merit there.
-static cav_status try_step(cav_solve_run *run, descent *d, double multiple, double enough, double *merit) {
-  int n = cav_transcription_unknowns(run->tr), better;
-  const double *step = cav_quadratic_step(d->qp);
-  for (int i = 0; i < n; i++) d->x[i] = multiple * step[i];
-  cav_transcription_move(run->tr, run->at, d->x, run->spare);
-  cav_status status = try_at(run, d, run->spare, merit);
-  keep_parts(d);
-  if (status != CAV_OK || !isfinite(*merit) || d->merit - *merit > enough) return status;
-  if (!d->course.known) {
-    status = cav_course_find(&d->course, run->tr, d->qp, run->at, d->second);
-    d->last = NULL;
-  }
-  for (int i = 0; i < n; i++) d->x[i] = multiple * (step[i] + multiple * d->course.bend[i]);
-  if (status == CAV_OK && d->course.known) status = try_better(run, d, run->at, d->x, merit, &better);
-  // corrections start from the values of what they correct
-  if (status == CAV_OK && d->last != run->spare) status = cav_transcription_values(run->tr, run->spare);
-  for (int round = 0; round < CORRECTIONS && status == CAV_OK && d->merit - *merit <= enough; round++) {
-    double before = *merit;
-    cav_course_correct(&d->course, run->tr, d->qp, multiple, d->x);
-    status = try_better(run, d, run->spare, d->x, merit, &better);
-    if (!better || before - *merit < worth * fabs(d->predicted - d->merit + before)) break;
-  }
-  return status;
-}
-
-/// A part of a step that falls short, in the place of a programme in smaller boxes: what its course misses goes with the
-/// cube of it. run->spare stays what it is where the part gains less.
-static cav_status shorten(cav_solve_run *run, descent *d, double *merit) {
-  for (int i = 0; i < 2; i++) {
-    double part = shorter[i][0], fraction = part * (2 - part), there;
-    if (d->ratio < shorter[i][1]) continue;
-    memcpy(d->parts, d->after, (size_t)run->tr->nknot * sizeof(double));
-    cav_run_exchange(&run->spare, &d->best);
-    cav_status status = try_step(run, d, part, fraction * d->predicted, &there);
-    if (status != CAV_OK) return status;
-    if (there < *merit && d->merit - there > 0.1 * fraction * d->predicted) {
-      *merit = there;
-      d->predicted *= fraction;
-      for (int t = 0; t < run->tr->nknot; t++) d->forecast[t] *= fraction;
-      d->ratio = (d->merit - there) / d->predicted;
-      return CAV_OK;
-    }
-    cav_run_exchange(&run->spare, &d->best);
-    memcpy(d->after, d->parts, (size_t)run->tr->nknot * sizeof(double));
-    d->last = NULL;
-  }
-  return CAV_OK;
-}
-
-/// Whether the programme's step is too short: the curvature was made convex, or what held its factors held the step.
-static int is_short(const descent *d) {
-  return d->ratio > exceeded || (d->ratio > fair && cav_quadratic_unfinished(d->qp) > unfinished);
-}
-
-/// Longer and longer steps while they gain.
-static cav_status extrapolate(cav_solve_run *run, descent *d, double *merit) {
-  double multiple = 2, limit = most_radius / cav_quadratic_length(d->qp);
-  for (; multiple <= limit; multiple *= 2) {
-    cav_run_exchange(&run->spare, &d->best);
-    double longer;
-    cav_status status = try_step(run, d, multiple, INFINITY, &longer);
-    if (status != CAV_OK) return status;
-    if (longer < *merit) {
-      *merit = longer;
-      continue;
-    }
-    cav_run_exchange(&run->spare, &d->best);
-    break;
-  }
-  return CAV_OK;
-}
-
-static cav_status iterate(cav_solve_run *run, descent *d, int *taken);
-
-/// The iteration over again, with the curvature of where it stands; all: of all knots.
-static cav_status renew(cav_solve_run *run, descent *d, int all, int *taken) {
-  d->ratio = 0;
-  cav_status status = model(run, d, all);
-  return status == CAV_OK ? iterate(run, d, taken) : status;
-}
-
-/// Largest step within a block of unknowns.
-static double block_length(const cav_transcription *tr, const double *x, int block) {
-  double most = 0;
-  if (block == cav_transcription_blocks(tr)) return tr->free_step ? fabs(x[block * tr->nv]) : 0;
-  for (int i = 0; i < tr->nv; i++) most = fmax(most, fabs(x[block * tr->nv + i]));
-  return most;
-}
-
-/// Boxes of the unknowns that a knot sees become factor times their steps at most.
-static void shrink(const cav_solve_run *run, descent *d, int t, double factor) {
-  const double *x = cav_quadratic_step(d->qp);
-  for (int c = 0; c < 3; c++) {
-    int b = cav_transcription_block(run->tr, t, c);
-    if (b >= 0) d->next[b] = fmin(d->next[b], factor * fmin(block_length(run->tr, x, b), d->radius[b]));
-  }
-}
-
-/// Boxes for the next programme: smaller about knots that keep a step from what it should gain, larger about those that
-/// do as forecast, where they held the step.
-static void find_boxes(const cav_solve_run *run, descent *d) {
-  const cav_transcription *tr = run->tr;
-  const double *x = cav_quadratic_step(d->qp);
-  double most = 0;
-  for (int t = 0; t < tr->nknot; t++) most = fmax(most, missed(d, t));
-  double bad = d->ratio < 0.25 ? fmin(0.1 * d->predicted, 0.5 * most) : 0.25 * d->predicted;
-  for (int b = 0; b <= cav_transcription_blocks(tr); b++)
-    d->next[b] = block_length(tr, x, b) > 0.9 * d->radius[b] && d->ratio > 0.25 ? fmin(2 * d->radius[b], most_radius)
-                                                                                : d->radius[b];
-  for (int t = 0; t < tr->nknot; t++) {
-    double off = missed(d, t);
-    if (off >= bad && d->ratio < 0.75)
-      shrink(run, d, t, off > 10 * d->predicted ? 0.2 : 0.5);
-    else if (off > 0.1 * d->predicted && d->ratio < 0.75)
-      shrink(run, d, t, 1);
-  }
-}
-
-static void take_boxes(const cav_solve_run *run, descent *d) {
-  memcpy(d->radius, d->next, ((size_t)cav_transcription_blocks(run->tr) + 1) * sizeof(double));
-}
-
-static double largest_radius(const cav_transcription *tr, const double *radius) {
-  double most = 0;
-  for (int b = 0; b < cav_transcription_blocks(tr) + tr->free_step; b++) most = fmax(most, radius[b]);
-  return most;
-}
-
-/// Whether rows are off that Gauss-Newton's programmes, which are convex, do not bring nearer: curvature does not either,
-/// the augmented Lagrangian may.
-static int is_lost(const cav_solve_run *run, const descent *d) { return d->age < 0 && !cav_run_met(run); }
-
-/// One iteration from a linearisation: programmes in smaller and smaller boxes until a step is accepted, or until the
-/// model has to be a better one. *taken: whether one was.
-static cav_status iterate(cav_solve_run *run, descent *d, int *taken) {
-  *taken = 0;
-  cav_programme_values(run->tr, cav_quadratic_value(d->qp));
-  cav_course_begin(&d->course, run->tr);
-  for (int i = 0; i < ATTEMPTS; i++) {
-    cav_status status = solve_model(run, d);
-    if (status != CAV_OK) return status;
-    double scale = cav_programme_scale(run->tr), trial;
-    d->course.known = 0;
-    d->merit = cav_programme_merit(run->tr, cav_quadratic_penalty(d->qp), d->before);
-    d->predicted = cav_quadratic_decrease(d->qp);
-    for (int t = 0; t < run->tr->nknot; t++) d->forecast[t] = cav_quadratic_knot_decrease(d->qp, t);
-    memcpy(d->multiplier, cav_quadratic_multiplier(d->qp), (size_t)cav_quadratic_rows(d->qp) * sizeof(double));
-    if (d->predicted <= stationary * scale) return is_lost(run, d) || d->whole ? CAV_OK : renew(run, d, 1, taken);
-    status = try_step(run, d, 1, 0.9 * d->predicted, &trial);
-    if (status != CAV_OK) return status;
-    d->ratio = (d->merit - trial) / d->predicted;
-    find_boxes(run, d);
-    status = d->ratio < enough_of_it ? shorten(run, d, &trial) : is_short(d) ? extrapolate(run, d, &trial) : CAV_OK;
-    if (status != CAV_OK) return status;
-    if (d->ratio > 1e-4) {
-      take_boxes(run, d);
-      d->gain = d->merit - trial;
-      d->few = d->gain < gauss_newton * scale ? d->few + 1 : 0;
-      cav_run_exchange(&run->at, &run->spare);
-      *taken = 1;
-      return d->last == run->at ? CAV_OK : cav_transcription_values(run->tr, run->at);
-    }
-    // values of the linearisation, which the trial has overwritten
-    status = cav_transcription_values(run->tr, run->at);
-    if (status != CAV_OK) return status;
-    int enough = d->predicted <= predicted_enough * scale && cav_run_met(run);
-    if (enough) return d->whole ? CAV_OK : renew(run, d, 1, taken);
-    double miss = 0;
-    for (int t = 0; t < run->tr->nknot; t++) miss = fmax(miss, missed(d, t));
-    if (d->age > 0 && miss < far * d->predicted) return renew(run, d, 0, taken);
-    take_boxes(run, d);
-    if (largest_radius(run->tr, d->radius) < least_radius) break;
-  }
-  return d->age < 0 && !is_lost(run, d) ? renew(run, d, 1, taken) : CAV_OK;
-}
-
-/// How far rows are off at the last values.
-static double rows_off(const cav_transcription *tr) {
-  return fmax(cav_transcription_unactuated(tr, NULL), cav_transcription_violation(tr));
-}
-
-/// Brings rows in that are still off by what is not linear in them, along the last programme's metric.
-static cav_status settle_rows(cav_solve_run *run, descent *d) {
-  cav_transcription *tr = run->tr;
-  cav_status status = CAV_OK;
-  double worst = INFINITY;
-  for (int i = 0; i < SETTLING && status == CAV_OK; i++) {
-    const double is = rows_off(tr);
-    if (!(is < 0.5 * worst) || is < 0.01 * run->options->tolerance) break;
-    worst = is;
-    for (int t = 0, k = 0; t < tr->nknot; t++)
-      for (int j = 0; j < tr->knot[t].layout.count; j++) {
-        const cav_slot *slot = &tr->knot[t].slot[j];
-        d->offset[k++] = slot->value - fmin(fmax(slot->value, slot->lower), slot->upper);
-      }
-    cav_quadratic_correct(d->qp, d->offset, NULL, d->x);
-    cav_transcription_move(tr, run->at, d->x, run->spare);
-    double merit;
-    status = try_at(run, d, run->spare, &merit);
-    int nearer = isfinite(merit) && rows_off(tr) < is;
-    if (nearer) cav_run_exchange(&run->at, &run->spare);
-    if (!nearer && status == CAV_OK) status = cav_transcription_values(tr, run->at);
-  }
-  return status;
-}
-
-/// Multipliers of the augmented Lagrangian at the last values, with which the penalties and the curvature begin.
-static void begin(cav_solve_run *run, descent *d) {
-  cav_transcription_multipliers(run->tr);
-  cav_programme_penalties(run->tr, cav_quadratic_penalty(d->qp));
-  for (int t = 0, k = 0; t < run->tr->nknot; t++)
-    for (int i = 0; i < run->tr->knot[t].layout.count; i++) d->multiplier[k++] = run->tr->knot[t].slot[i].multiplier;
-  take_penalties(run->tr);
-}
-
-/// How optimal run->at is, by the Lagrangian's Hessian of the last multipliers, or by the costs' alone; and the rows'
-/// multipliers.
-static cav_status measure(cav_solve_run *run, descent *d, int curved) {
-  cav_status status = curved ? cav_curvature_find(d->curvature, run->tr, run->at, run->spare, d->multiplier, NULL)
-                             : cav_transcription_linearise(run->tr, run->at);
-  if (status != CAV_OK) return status;
-  d->shift = 0;
-  d->needs_known = 0;
-  d->ratio = 0;
-  if (curved) add_curvature(run, d);
-  cav_programme_values(run->tr, cav_quadratic_value(d->qp));
-  set_radius(run->tr, d->radius, most_radius);
-  status = solve_model(run, d);
-  if (status != CAV_OK) return status;
-  // a bound: what the programme decreases, and what its gap leaves open
-  run->optimality = (fmax(cav_quadratic_decrease(d->qp), 0) + cav_quadratic_gap(d->qp)) / cav_programme_scale(run->tr);
-  run->measured = 1;
-  memcpy(d->multiplier, cav_quadratic_multiplier(d->qp), (size_t)cav_quadratic_rows(d->qp) * sizeof(double));
-  for (int t = 0, k = 0; t < run->tr->nknot; t++)
-    for (int i = 0; i < run->tr->knot[t].layout.count; i++)
-      run->tr->knot[t].slot[i].final_multiplier = d->multiplier[k++];
-  return CAV_OK;
-}
-
-/// What a step may still save, by Gauss-Newton's model of here in the full box: that of the verifier. A fraction of the
-/// cost, infinite where that is not found: the programme is not solved, or not finished, as where its factors were held. Boxes
-/// and penalties stay as they are.
-static cav_status foresee(cav_solve_run *run, descent *d, double *saving) {
-  size_t bytes = (size_t)cav_quadratic_rows(d->qp) * sizeof(double);
-  int solved = 0;
-  cav_status status = cav_transcription_linearise(run->tr, run->at);
-  if (status != CAV_OK) return status;
-  cav_programme_values(run->tr, cav_quadratic_value(d->qp));
-  set_radius(run->tr, d->next, most_radius);
-  memcpy(d->offset, cav_quadratic_penalty(d->qp), bytes);
-  status = cav_programme_solve(run, d->qp, d->next, d->kept, &d->rest, &solved);
-  memcpy(cav_quadratic_penalty(d->qp), d->offset, bytes);
-  *saving = INFINITY;
-  d->at_least = solved ? fmax(cav_quadratic_decrease(d->qp), 0) / cav_programme_scale(run->tr) : 0;
-  if (solved && fabs(cav_quadratic_unfinished(d->qp)) <= unfinished)
-    *saving = (fmax(cav_quadratic_decrease(d->qp), 0) + cav_quadratic_gap(d->qp)) / cav_programme_scale(run->tr);
-  return status;
-}
-
 /// Slow progress where there is little to be saved: how often in a row that was so.
 typedef struct tail {
   int iterations, met, stuck; ///< since the last look; looks in a row that saw the end, or next to no progress
@@ -578,26 +53,26 @@ typedef struct tail {
 } tail;
 
 /// Whether that ends a run: 2, little is left; 3, it is stuck; 0, neither.
-static int is_end(const descent *d, const tail *end) {
+static int is_end(const cav_descent *d, const tail *end) {
   int stuck = end->stuck >= LOOKS;
   if (end->near || end->met >= LOOKS || (stuck && end->saving <= left_alone * d->asked)) return 2;
   return stuck && !d->patient ? 3 : 0;
 }
 
 /// Whether the last iteration hints at an end: it gained next to nothing and its programme predicted no more.
-static int hints(const cav_solve_run *run, const descent *d) {
+static int hints(const cav_solve_run *run, const cav_descent *d) {
   double little = d->near * cav_programme_scale(run->tr);
   return d->gain < little && d->predicted < little;
 }
 
 /// Looks, every few iterations that gain little; between two such looks once where an iteration hints at an end.
-static cav_status look(cav_solve_run *run, descent *d, tail *end) {
+static cav_status look(cav_solve_run *run, cav_descent *d, tail *end) {
   end->saving = INFINITY;
   end->gain += d->gain / cav_programme_scale(run->tr);
   int due = ++end->iterations >= LOOK, early = end->iterations > 1 && !end->hinted && hints(run, d);
   if (!due && !early) return CAV_OK;
   double gain = end->gain / end->iterations;
-  cav_status status = gain < d->asked ? foresee(run, d, &end->saving) : CAV_OK;
+  cav_status status = gain < d->asked ? cav_descent_foresee(run, d, &end->saving) : CAV_OK;
   end->near = end->saving <= d->near && gain < d->near;
   end->hinted = !due;
   if (!due) return status;
@@ -610,9 +85,9 @@ static cav_status look(cav_solve_run *run, descent *d, tail *end) {
 }
 
 /// Keeps the motion where its rows hold, or are as near as a certificate asks; until there is one, where they nearly do.
-static cav_status hold(const cav_solve_run *run, descent *d) {
+static cav_status hold(const cav_solve_run *run, cav_descent *d) {
   int holds = cav_run_certifiable(run);
-  const double most = rows_off(run->tr);
+  const double most = cav_run_rows_off(run);
   if (!holds && (d->holds || most > nearly)) return CAV_OK;
   d->holds = holds;
   cav_trajectory_free(d->held);
@@ -622,14 +97,14 @@ static cav_status hold(const cav_solve_run *run, descent *d) {
 }
 
 /// Rows brought in where the motion stands, and kept if they hold there.
-static cav_status settle_here(cav_solve_run *run, descent *d) {
-  cav_status status = settle_rows(run, d);
+static cav_status settle_here(cav_solve_run *run, cav_descent *d) {
+  cav_status status = cav_descent_settle_rows(run, d);
   return status == CAV_OK ? hold(run, d) : status;
 }
 
 /// Of a run that is stopped the last motion whose rows held; where there is time, and gains are asked for, the last one, if its
 /// rows can be brought in, or else the last one whose rows nearly held.
-static cav_status leave(cav_solve_run *run, descent *d) {
+static cav_status leave(cav_solve_run *run, cav_descent *d) {
   run->ending = run->soon && !run->at_once && run->options->gains;
   cav_status status = CAV_OK;
   if (run->ending && cav_quadratic_length(d->qp) > 0) {
@@ -638,7 +113,7 @@ static cav_status leave(cav_solve_run *run, descent *d) {
     if (status == CAV_OK && d->held && !d->holds) {
       double saving;
       cav_run_exchange(&run->at, &d->held);
-      status = foresee(run, d, &saving);
+      status = cav_descent_foresee(run, d, &saving);
       if (status == CAV_OK) status = settle_here(run, d);
     }
   }
@@ -647,25 +122,25 @@ static cav_status leave(cav_solve_run *run, descent *d) {
 }
 
 /// Where a run ends beside its rows: back to where they held, if that costs little, and by the metric of there.
-static cav_status go_back(cav_solve_run *run, descent *d) {
+static cav_status go_back(cav_solve_run *run, cav_descent *d) {
   double most = (1 + held_loss) * cav_transcription_cost(run->tr), saving;
   if (cav_run_met(run) || !d->held || d->held_cost > most) return CAV_OK;
   cav_run_exchange(&run->at, &d->held);
   cav_trajectory_free(d->held);
   d->held = NULL;
-  cav_status status = d->holds ? cav_transcription_values(run->tr, run->at) : foresee(run, d, &saving);
-  return status == CAV_OK ? settle_rows(run, d) : status;
+  cav_status status = d->holds ? cav_transcription_values(run->tr, run->at) : cav_descent_foresee(run, d, &saving);
+  return status == CAV_OK ? cav_descent_settle_rows(run, d) : status;
 }
 
 /// Asks once, where rows first nearly hold, whether a certificate would refuse the motion; the run ends there if they come in.
-static cav_status screen(cav_solve_run *run, descent *d) {
-  if (!d->screens || rows_off(run->tr) > nearly) return CAV_OK;
+static cav_status screen(cav_solve_run *run, cav_descent *d) {
+  if (!d->screens || cav_run_rows_off(run) > nearly) return CAV_OK;
   d->screens = 0;
   cav_status status = cav_run_screen(run);
   if (status != CAV_OK || !run->refused) return status;
   cav_trajectory *from = cav_trajectory_copy(run->at);
   if (!from) return CAV_NO_MEMORY;
-  status = settle_rows(run, d);
+  status = cav_descent_settle_rows(run, d);
   run->refused = cav_run_met(run);
   if (!run->refused) cav_run_exchange(&run->at, &from);
   if (status == CAV_OK && !run->refused) status = cav_transcription_values(run->tr, run->at);
@@ -675,58 +150,35 @@ static cav_status screen(cav_solve_run *run, descent *d) {
 
 /// Iterations to where no step gains, 1, what one may gain is little and is slow to come, 2, or is more and hardly
 /// comes, 3; or 0.
-static cav_status settle(cav_solve_run *run, descent *d, int *left, int *settled) {
+static cav_status settle(cav_solve_run *run, cav_descent *d, int *left, int *settled) {
   int calm = 0, taken = 1;
   tail end = {0};
-  double off = rows_off(run->tr);
+  double off = cav_run_rows_off(run);
   // iterations left to bring rows in by half; 0: they came, or were in
   int away = off > astray ? ASTRAY : off > nearly ? HOPELESS : 0;
   cav_status status = CAV_OK;
   for (; status == CAV_OK && *left > 0 && calm < PATIENCE && !is_end(d, &end) && !run->refused; --*left) {
-    status = model(run, d, 0);
-    if (status == CAV_OK) status = iterate(run, d, &taken);
+    status = cav_descent_step(run, d, &taken);
     if (status != CAV_OK || !taken) break;
     calm = d->gain < slow * cav_programme_scale(run->tr) ? calm + 1 : 0;
-    if (cav_run_report(run, cav_quadratic_length(d->qp), largest_radius(run->tr, d->radius))) status = CAV_INTERRUPTED;
+    if (cav_run_report(run, cav_quadratic_length(d->qp), cav_descent_radius(run->tr, d))) status = CAV_INTERRUPTED;
     if (status == CAV_OK) status = hold(run, d);
     if (status == CAV_OK) status = screen(run, d);
     if (status == CAV_OK) status = look(run, d, &end);
-    const int nearer = away && rows_off(run->tr) < 0.5 * off;
-    if (nearer) off = rows_off(run->tr), away = off > astray ? ASTRAY : 0;
+    const int nearer = away && cav_run_rows_off(run) < 0.5 * off;
+    if (nearer) off = cav_run_rows_off(run), away = off > astray ? ASTRAY : 0;
     if (away && !nearer && !--away) break;
   }
   int ended = is_end(d, &end);
   *settled = ended ? ended : !taken || calm >= PATIENCE;
-  if (status == CAV_OK) status = settle_rows(run, d);
+  if (status == CAV_OK) status = cav_descent_settle_rows(run, d);
   return status == CAV_OK ? go_back(run, d) : status;
-}
-
-/// A step across a jump of the merit, in the largest box in which it loses little. *taken: whether there is one.
-static cav_status leap(cav_solve_run *run, descent *d, int *taken) {
-  *taken = 0;
-  double scale = cav_programme_scale(run->tr), trial;
-  cav_status status = CAV_OK;
-  for (int i = 0; i < LEAP_BOXES && !*taken; i++) {
-    set_radius(run->tr, d->radius, leap_box[i]);
-    status = solve_model(run, d);
-    if (status != CAV_OK) return status;
-    d->merit = cav_programme_merit(run->tr, cav_quadratic_penalty(d->qp), d->before);
-    d->predicted = cav_quadratic_decrease(d->qp);
-    cav_course_begin(&d->course, run->tr);
-    status = try_step(run, d, 1, d->predicted, &trial);
-    if (status != CAV_OK) return status;
-    *taken = trial - d->merit < leap_loss * scale;
-    if (!*taken) status = cav_transcription_values(run->tr, run->at);
-    if (status != CAV_OK) return status;
-  }
-  if (*taken) cav_run_exchange(&run->at, &run->spare);
-  return CAV_OK;
 }
 
 /// Iterations to the end, so many at most. Where they end before the motion is optimal a jump of the merit holds them: a
 /// contact comes or goes there. Steps across are tried, and the best of the ends is kept. *settled: how the last of them
 /// ended, as in settle.
-static cav_status descend(cav_solve_run *run, descent *d, int *left, int *settled) {
+static cav_status descend(cav_solve_run *run, cav_descent *d, int *left, int *settled) {
   int taken = 1, ended;
   cav_trajectory *best = NULL;
   double cost = INFINITY;
@@ -739,16 +191,16 @@ static cav_status descend(cav_solve_run *run, descent *d, int *left, int *settle
     if (!(reached < (1 - slow) * cost)) {
       if (reached >= cost) cav_run_exchange(&run->at, &best);
       status = cav_transcription_values(run->tr, run->at);
-      if (status == CAV_OK) status = measure(run, d, 1);
+      if (status == CAV_OK) status = cav_descent_measure(run, d, 1);
       break;
     }
     cost = reached;
     *settled = ended;
     cav_trajectory_free(best);
     best = cav_trajectory_copy(run->at);
-    status = best ? measure(run, d, ended < 2) : CAV_NO_MEMORY;
+    status = best ? cav_descent_measure(run, d, ended < 2) : CAV_NO_MEMORY;
     if (status != CAV_OK || run->refused || ended >= 2 || run->optimality < optimal || i == LEAPS || *left <= 0) break;
-    status = leap(run, d, &taken);
+    status = cav_descent_leap(run, d, &taken);
   }
   cav_trajectory_free(best);
   return status;
@@ -757,18 +209,18 @@ static cav_status descend(cav_solve_run *run, descent *d, int *left, int *settle
 /// A run of so many iterations at most, to what may be left to be saved; noted at a fraction of the way. soft: on the way,
 /// where rows need not come in.
 static cav_status run_of(cav_solve_run *run, int *left, double asked, double fraction, int soft, int *stuck) {
-  descent d;
+  cav_descent d;
   int first = run->solution->iterations, settled = 0;
   cav_penalties kept = run->tr->penalty;
   cav_trajectory *entry = cav_trajectory_copy(run->at);
   if (!entry) return CAV_NO_MEMORY;
-  cav_status status = descent_new(&d, run) ? cav_transcription_values(run->tr, run->at) : CAV_NO_MEMORY;
-  const double off = rows_off(run->tr);
+  cav_status status = cav_descent_make(&d, run) ? cav_transcription_values(run->tr, run->at) : CAV_NO_MEMORY;
+  const double off = cav_run_rows_off(run);
   d.asked = asked;
   d.near = soft ? 0 : near_end * asked;
   d.patient = !stuck;
   d.screens = !soft;
-  if (status == CAV_OK) begin(run, &d);
+  if (status == CAV_OK) cav_descent_begin(run, &d);
   if (status == CAV_OK && cav_run_certifiable(run)) status = hold(run, &d);
   run->measured = 0;
   if (status == CAV_OK) status = descend(run, &d, left, &settled);
@@ -784,14 +236,14 @@ static cav_status run_of(cav_solve_run *run, int *left, double asked, double fra
   if (!cav_run_note(run, fraction, first, outcome)) status = CAV_NO_MEMORY;
   if (status == CAV_OK && !met && !soft) {
     // what nearly brings the rows in is nearer to the end than where it began
-    const double still = rows_off(run->tr);
+    const double still = cav_run_rows_off(run);
     const int better = still <= nearly && still <= brought_in * off;
     if (!better) cav_run_exchange(&run->at, &entry);
     if (!better) status = cav_transcription_values(run->tr, run->at);
     if (status == CAV_OK) status = CAV_NOT_CONVERGED;
   }
   cav_trajectory_free(entry);
-  descent_free(&d);
+  cav_descent_clear(&d);
   return status;
 }
 
@@ -815,14 +267,14 @@ cav_status cav_sqp_on_the_way(cav_solve_run *run, double fraction, int *left) {
 }
 
 cav_status cav_sqp_measure(cav_solve_run *run) {
-  descent d;
+  cav_descent d;
   cav_penalties kept = run->tr->penalty;
-  cav_status status = descent_new(&d, run) ? cav_transcription_values(run->tr, run->at) : CAV_NO_MEMORY;
-  if (status == CAV_OK) begin(run, &d);
+  cav_status status = cav_descent_make(&d, run) ? cav_transcription_values(run->tr, run->at) : CAV_NO_MEMORY;
+  if (status == CAV_OK) cav_descent_begin(run, &d);
   // multipliers first, then the decrease with the curvature that goes with them
-  if (status == CAV_OK) status = measure(run, &d, 0);
-  if (status == CAV_OK) status = measure(run, &d, 1);
+  if (status == CAV_OK) status = cav_descent_measure(run, &d, 0);
+  if (status == CAV_OK) status = cav_descent_measure(run, &d, 1);
   run->tr->penalty = kept;
-  descent_free(&d);
+  cav_descent_clear(&d);
   return status;
 }

@@ -10,7 +10,6 @@
 #include "math3.h"
 #include "quantity.h"
 #include "role.h"
-#include "transcription.h"
 
 /// Weight of the terms that lead.
 static const double weight = 300;
@@ -32,7 +31,7 @@ static void add_term(const cav_problem *p, const cav_term *term, cav_state *stat
   const cav_sensor *s = &term->sensor;
   const int z = term->component < 0 || term->component == 2;
   double at[CAV_SENSOR_DIM_MAX], target[CAV_SENSOR_DIM_MAX];
-  if (!cav_term_places(p->model, term, found->link) || !cav_term_asks(term)) return;
+  if (cav_term_placed(p->model, term) != found->link || !cav_term_asks(term)) return;
   const double to = term->to < 0 ? p->duration : fmin(term->to, p->duration);
   cav_sensor_read(p->model, state, s, at);
   if (term->use == CAV_USE_RANGE) {

@@ -22,7 +22,7 @@ static int is_wanted(const cav_problem *p, const cav_joint *joint) {
   for (int k = 0; k < 3; k++) way += pow(p->q_goal[joint->q + k] - p->q_start[joint->q + k], 2);
   int wanted = sqrt(way) > least_way;
   for (int i = 0; i < p->nterm && !wanted; i++)
-    wanted = cav_term_asks(&p->term[i]) && cav_term_places(p->model, &p->term[i], joint->link);
+    wanted = cav_term_asks(&p->term[i]) && cav_term_placed(p->model, &p->term[i]) == joint->link;
   return wanted;
 }
 

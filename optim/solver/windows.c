@@ -15,7 +15,6 @@
 #include "continuation.h"
 #include "file.h"
 #include "quantity.h"
-#include "transcription.h"
 
 static const double near_knot = 1e-6; // of a step
 

@@ -4,6 +4,7 @@
 /// row enters by an augmented Lagrangian. Where the step is free, every row's derivative by its logarithm is the
 /// difference of two passes that begin the same rows.
 #include "knot.h"
+#include "quantity.h"
 #include "rotation.h"
 #include "vectors.h"
 

@@ -12,6 +12,7 @@
 
 #include "dof_groups.h"
 #include "knot.h"
+#include "quantity.h"
 #include "rotation.h"
 
 /// Differences: of configurations, rad or m; of velocities that times the step.

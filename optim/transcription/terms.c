@@ -85,22 +85,6 @@ int cav_dof_selected(const cav_transcription *tr, const cav_term *term, int d) {
   return cav_problem_selects(tr->model, term, d);
 }
 
-/// Target of a term at a knot: constant, waypoints, or zeros.
-void cav_term_target(const cav_term *term, double time, int dim, double *target) {
-  if (!term->target) {
-    memset(target, 0, (size_t)dim * sizeof(double));
-  } else if (term->nwaypoint == 0) {
-    memcpy(target, term->target, (size_t)dim * sizeof(double));
-  } else {
-    int n = term->nwaypoint, i = 0;
-    while (i < n - 2 && time > term->waypoint_time[i + 1]) i++;
-    int j = i + 1 < n ? i + 1 : i;
-    double span = term->waypoint_time[j] - term->waypoint_time[i];
-    double s = span > 0 ? fmin(fmax((time - term->waypoint_time[i]) / span, 0), 1) : 0;
-    for (int k = 0; k < dim; k++) target[k] = (1 - s) * term->target[i * dim + k] + s * term->target[j * dim + k];
-  }
-}
-
 cav_status cav_user_term_check(const cav_term *term, cav_error *error) {
   const cav_user_quantity *user = term->user;
   const char *reason = NULL;

@@ -331,7 +331,4 @@ void cav_term_read(const cav_transcription *transcription, cav_state *state, con
 /// Time of a knot for windows and targets: a fraction of the problem's duration, whatever the step has become. terms.c.
 double cav_knot_time(const cav_transcription *transcription, int t);
 
-/// Target of a term at a time, dim numbers: constant, between waypoints, or zeros.
-void cav_term_target(const cav_term *term, double time, int dim, double *target);
-
 #endif

@@ -46,18 +46,6 @@ int cav_command_unmeasured(const cav_problem *p, const cav_term *term) {
                                  : ceil(term->from / p->timestep - 1e-6) >= last;
 }
 
-/// Target of a term at a time, dim numbers: linear between waypoints, zeros where it has none.
-static void target_at(const cav_term *term, double time, int dim, double *out) {
-  int low = 0, high = 0;
-  double part = 0;
-  for (int k = 0; k < dim; k++) out[k] = 0;
-  if (!term->target) return;
-  while (high + 1 < term->nwaypoint && term->waypoint_time[high] < time) high++;
-  low = high > 0 && term->waypoint_time[high] > time ? high - 1 : high;
-  if (low < high) part = (time - term->waypoint_time[low]) / (term->waypoint_time[high] - term->waypoint_time[low]);
-  for (int k = 0; k < dim; k++) out[k] = (1 - part) * term->target[low * dim + k] + part * term->target[high * dim + k];
-}
-
 /// Unit of a value of a term: that of its tolerance, if it had one.
 static void unit_of(const cav_problem *p, const cav_term *term, char unit[16]) {
   cav_term asked = *term;
@@ -79,7 +67,7 @@ static void write_reading(const comparison *c, const cav_term *term, cav_state *
     return;
   cav_sensor_read(c->p->model, state, s, x);
   if (s->dim == 4) {
-    if (term->target) target_at(term, time, 4, target);
+    if (term->target) cav_term_target(term, time, 4, target);
     quat_normalise(target);
     cav_rotation_between(target, x, phi);
     snprintf(out, CELL, "%.4g off", cav_command_plain(term->component < 0 ? norm3(phi) : phi[term->component]));
@@ -104,7 +92,7 @@ static void write_wanted(const cav_term *term, double time, char *out) {
   else if (s->dim == 4)
     snprintf(out, CELL, "0 off");
   else {
-    target_at(term, time, s->dim, target);
+    cav_term_target(term, time, s->dim, target);
     if (one)
       snprintf(out, CELL, "%.4g", cav_command_plain(target[k]));
     else
@@ -154,7 +142,7 @@ static int write_posture(const comparison *c, const cav_term *term, char name[NA
   const cav_model *m = p->model;
   double *wanted = c->work, *d = wanted + m->nq, *other = d + m->nv;
   memcpy(wanted, p->q_goal, (size_t)m->nq * sizeof *wanted);
-  if (term->target) target_at(term, time_of(p, term), m->nq, wanted);
+  if (term->target) cav_term_target(term, time_of(p, term), m->nq, wanted);
   if (term->target) cav_configuration_normalise(m, wanted);
   const int a = farthest(p, term, wanted, p->q_start, d), b = farthest(p, term, wanted, p->q_goal, other);
   if (a < 0) return 0;

@@ -26,11 +26,9 @@ static const char *name_of(const cav_model *m, int link) {
 
 /// The link whose place in the world a term wants at a time; -1: it wants none.
 static int placed(const cav_problem *p, const cav_term *term) {
-  const cav_sensor *s = &term->sensor;
-  const int wanted = term->quantity == CAV_QUANTITY_SENSOR && s->type == CAV_SENSOR_FRAMEPOS && !s->referred &&
-                     term->use == CAV_USE_COST && term->weight > 0 && term->target && term->nwaypoint == 0 &&
-                     isfinite(term->within);
-  return wanted ? cav_object_link(p->model, s->object_type, s->object) : -1;
+  const int wanted =
+      term->use == CAV_USE_COST && term->weight > 0 && term->target && term->nwaypoint == 0 && isfinite(term->within);
+  return wanted ? cav_term_placed(p->model, term) : -1;
 }
 
 /// How far a link has to go for a term from where it starts, along the ground and in all, m.
