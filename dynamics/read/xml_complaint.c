@@ -179,6 +179,7 @@ typedef struct synonym {
 } synonym;
 
 static const synonym attribute_synonyms[] = {
+    {"geom", {"body"}},
     {"tolerance", {"within"}},
     {"tol", {"within"}},
     {"error", {"within"}},

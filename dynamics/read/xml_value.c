@@ -56,7 +56,7 @@ static void read_numbers(cav_xml_source *s, int line, const char *element, cav_x
   int count = 0;
   for (const char *p = value->text; *p; p++) count += !is_space(*p) && (p == value->text || is_space(p[-1]));
   if (count < rule->min || (rule->max && count > rule->max)) {
-    cav_xml_source_fail(s, CAV_BAD_INPUT, line, element, rule->name, "expected %s, got %d in '%.60s'%s", expected,
+    cav_xml_source_fail(s, CAV_BAD_INPUT, line, element, rule->name, "expected %s, got %d in '%.60s'; %s", expected,
                         count, value->text, how_to_write(value, "give the right number of values"));
     return;
   }

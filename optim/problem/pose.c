@@ -139,11 +139,10 @@ static cav_status read_key(const cav_problem_reader *reader, const cav_xml_node 
   const char *near = nearest_key(reader, copy);
   char known[NAMES] = "";
   if (!near) list_keys(reader, cav_xml_text(node, "name", ""), known);
-  if (!near && !*known)
-    snprintf(known, sizeof known, "; 'stand', 'kneel', 'sit' and more are found: cavort help postures");
   cav_xml_fail(reader->error, node, "key",
-               "neither the model '%s' nor this file has a keyframe or pose of that name, got '%.200s'%s%s%s%s",
-               m->name, list, near ? "; did you mean '" : "", near ? near : "", near ? "'?" : "", known);
+               "neither the model '%s' nor this file has a keyframe or pose of that name, got '%.200s'%s%s%s%s%s",
+               m->name, list, near ? "; did you mean '" : "", near ? near : "", near ? "'?" : "", known,
+               near ? "" : "; 'stand', 'kneel', 'sit' and more are found: cavort help postures");
   free(copy);
   return CAV_BAD_INPUT;
 }

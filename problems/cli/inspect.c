@@ -655,6 +655,24 @@ void cav_command_tell_step(FILE *out, const cav_problem *p) {
         p->duration, p->timestep, p->duration / p->timestep + 1, bytes_of(p) / 1e9, p->duration, p->duration / 1000);
 }
 
+// what moves at the start, each joint in a line
+static void print_start_speeds(const cav_problem *p) {
+  const cav_model *m = p->model;
+  for (int j = 0; j < m->njoint; j++) {
+    const cav_joint *joint = &m->joint[j];
+    const double *v = p->v_start + joint->dof;
+    const char *name = *joint->name ? joint->name : m->body[joint->body].name;
+    const int n = joint->type == CAV_JOINT_FREE ? 6 : joint->type == CAV_JOINT_BALL ? 3 : 1;
+    double most = 0;
+    for (int k = 0; k < n; k++) most = fmax(most, fabs(v[k]));
+    if (most == 0) continue;
+    printf("         '%.60s' moves at ", name);
+    if (n == 6) printf("%.3g %.3g %.3g m/s, ", v[0], v[1], v[2]);
+    if (n > 1) printf("%.3g %.3g %.3g rad/s about its own axes\n", v[n - 3], v[n - 2], v[n - 1]);
+    if (n == 1) printf("%.3g %s\n", v[0], joint->type == CAV_JOINT_SLIDE ? "m/s" : "rad/s");
+  }
+}
+
 static cav_status print_problem(const cav_problem *p, int all, cav_error *error) {
   static const char *const order[] = {"euler", "midpoint", "momentum"};
   int knots = (int)lround(p->duration / p->timestep) + 1;
@@ -674,13 +692,16 @@ static cav_status print_problem(const cav_problem *p, int all, cav_error *error)
   if (p->duration_most > 0)
     printf("  duration free from %g to %g s, weight %g\n", p->duration_least, p->duration_most, p->duration_weight);
   if (p->cycle.on)
-    printf("  a period moves by %g %g %g m and turns by %g degrees%s\n", p->cycle.translation[0],
-           p->cycle.translation[1], p->cycle.translation[2], p->cycle.rotation * 180 / M_PI,
+    printf("  a %s moves by %g %g %g m, %.3g m/s on average, and turns by %g degrees%s\n",
+           p->cycle.mirror == CAV_MIRROR_NONE ? "period" : "half stride", p->cycle.translation[0],
+           p->cycle.translation[1], p->cycle.translation[2],
+           hypot(p->cycle.translation[0], p->cycle.translation[1]) / p->duration, p->cycle.rotation * 180 / M_PI,
            p->cycle.mirror == CAV_MIRROR_X   ? ", mirrored along x"
            : p->cycle.mirror == CAV_MIRROR_Y ? ", mirrored along y"
                                              : "");
   cav_command_tell_asymmetry(p, stdout);
   cav_status status = cav_command_print_stance(p, "start", p->q_start, error);
+  if (!status && !p->cycle.on) print_start_speeds(p);
   if (!status && cav_problem_has_goal(p)) status = cav_command_print_stance(p, "goal", p->q_goal, error);
   if (status) return status;
   if (!cav_problem_has_goal(p)) printf("  goal   no <goal>: the goal posture is the start\n");

@@ -88,7 +88,7 @@ static const struct {
      "dofs"},
     {"unit|units|metre|metres|meter|meters|radian|radians",
      "m, s, kg, N and rad; degrees in the attributes degrees, euler and rotation alone", NULL},
-    {"floor|ground|plane|table|box|wall|object|objects|stairs|ball|terrain|environment",
+    {"floor|ground|plane|table|box|wall|object|objects|ball|terrain|environment",
      "what the model's file does not have stands in <scene>, as MJCF writes it:\n"
      "  <scene><geom name=\"floor\" type=\"plane\" size=\"0 0 1\"/></scene>; height=\"floor\" of a posture puts it "
      "down "
@@ -116,7 +116,7 @@ static const struct {
      "forces of actuators are planned within their limits: <effort> is their cost, <limits effort> how much of them is "
      "used",
      "effort"},
-    {"friction|footstep|footsteps|gait|contacts",
+    {"friction|footstep|footsteps|contacts",
      "contacts are found, no file says when; friction is that of geoms, in the model's file or the <scene>", "contact"},
     {"dt|knot|step|steps|fps|length", "knots are timestep apart, duration is a whole number of steps", "horizon"},
     {"touching|press|pressure|lean|support|bear",
@@ -210,7 +210,41 @@ static const struct {
      "  <sensor type=\"jointpos\" joint=\"door\" .../>, and hands are brought to it. What nothing stops at the end:\n"
      "  <horizon close=\"open\"/>",
      "jointpos"},
-    {"jump|hop|walk|kick|climb|crawl|roll|backflip|cartwheel|handstand|dance|motions|examples",
+    {"stairs|steps|step|ladder|ledge|podium|hurdle|over|vault|gap",
+     "what is stepped on or over stands in <scene>; the goal's posture stands on it with height=\"floor\" and rise= "
+     "the height "
+     "of\n"
+     "  its top. A file without a <guess> is begun with limbs that swing over it; where it fails others are tried. "
+     "Motions\n"
+     "  to copy: problems/motions/stairs, step-up",
+     "rise"},
+    {"gait|stride|trot|pace|gallop|periodic|cyclic",
+     "a gait is <cycle translation=\"0.5 0 0\" mirror=\"y\"/>: with a mirror the horizon and the translation are those "
+     "of half a\n"
+     "  stride, and the other half is the same with left and right exchanged. Limbs swing in the guess by <swing> of "
+     "<guess>;\n"
+     "  a walk from start to goal needs neither, its gait is found",
+     "cycle"},
+    {"turn|yaw|pirouette",
+     "how a body is turned at the end: <root pos=\"X Y Z\" euler=\"0 0 90\"/> of <goal>, degrees, and a posture that "
+     "asks "
+     "for it\n"
+     "  (dofs=\"all\"); of a cycle rotation=. Which way a turn by more than 180 degrees goes is said by rotation= of "
+     "<guess>",
+     "euler"},
+    {"wheel|wheels|flywheel|reaction|pendulum|balance|balancing|unstable|swingup",
+     "what turns without end is no posture: <posture joint=\"wheel\" weight=\"0\"/>, and <velocity joint=\"wheel\" "
+     "weight=\"0\"/>\n"
+     "  where it turns fast, take the usual costs off it. A balance that is held, or found by swinging up, is <goal> "
+     "and\n"
+     "  <posture ... at=\"end\">; energy is pumped in by a guess of its own where motors are weak",
+     "weight"},
+    {"pickup|pick|bring|fetch|deliver|place-on|stack",
+     "a thing that is brought somewhere is asked for by its place: help move. Two hands are led to its sides by "
+     "themselves;\n"
+     "  one hand or a gripper is not: help grasp",
+     "framepos"},
+    {"jump|hop|walk|kick|climb|crawl|roll|pushup|push-up|backflip|cartwheel|handstand|dance|motions|examples",
      "motions of the project stand in problems/motions; cavort new MODEL --like jump writes one for a model", "new"},
     {"output|folder|csv|trajectory|json|files",
      "cavort solve writes a folder, NAME.result; its files: problems/README.md, Result folders", "solve"},
