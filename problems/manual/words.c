@@ -210,7 +210,7 @@ static const struct {
      "  <sensor type=\"jointpos\" joint=\"door\" .../>, and hands are brought to it. What nothing stops at the end:\n"
      "  <horizon close=\"open\"/>",
      "jointpos"},
-    {"stairs|steps|step|ladder|ledge|podium|hurdle|over|vault|gap",
+    {"stairs|stair|ladder|ledge|podium|hurdle|over|vault",
      "what is stepped on or over stands in <scene>; the goal's posture stands on it with height=\"floor\" and rise= "
      "the height "
      "of\n"
@@ -239,7 +239,7 @@ static const struct {
      "and\n"
      "  <posture ... at=\"end\">; energy is pumped in by a guess of its own where motors are weak",
      "weight"},
-    {"pickup|pick|bring|fetch|deliver|place-on|stack",
+    {"pickup|pick|bring|fetch|deliver|stack",
      "a thing that is brought somewhere is asked for by its place: help move. Two hands are led to its sides by "
      "themselves;\n"
      "  one hand or a gripper is not: help grasp",
