@@ -458,6 +458,72 @@ static void check_duck(void) {
   cav_problem_free(p);
 }
 
+// a gantry crane whose load would go through a container hoists it over that, by more than a radian's worth of a slide
+static void check_hoist(void) {
+  cav_error error = {0};
+  cav_problem *p = cav_problem_load(CAVORT_SOURCE_ROOT "/tests/unseen/crane-over-wall.xml", NULL, &error), taken;
+  if (!CHECK(p != NULL)) return;
+  cav_strategy strategy[CAV_STRATEGIES];
+  int n;
+  CHECK(cav_strategy_list(p, strategy, &n) == CAV_OK && strategy[0].nswing == 2);
+  cav_strategy_apply(p, &strategy[0], &taken);
+  cav_trajectory *way = cav_problem_guess(&taken, &error);
+  cav_state *state = cav_state_new(p->model);
+  double high = INFINITY, deep = 0;
+  for (int t = 0; way && t < way->nknot; t++) {
+    const double *q = way->q + (size_t)t * (size_t)way->nq;
+    high = fmin(high, q[2]);
+    CHECK(cav_position(p->model, state, q) == CAV_OK);
+    for (int i = 0; i < state->ncontact; i++) deep = fmax(deep, -state->contact[i].dist);
+  }
+  CHECK(way && p->q_start[2] - high > 1 && deep < 1e-6);
+  cav_solution *solution = NULL;
+  cav_verdict v;
+  CHECK(cav_strategy_solve(p, &strategy[0], NULL, NULL, &solution, &error) == CAV_OK);
+  if (CHECK(solution && solution->gain_q))
+    CHECK(cav_verify_solution(&taken, solution, &v, &error) == CAV_OK && v.certified && v.achieved);
+  cav_solution_free(solution);
+  cav_state_free(state);
+  cav_trajectory_free(way);
+  cav_strategies_clear(strategy, n);
+  cav_problem_free(p);
+}
+
+// a thing whose straight way goes through the edge of a shelf is lifted over that, and who stands before it is not
+static void check_thing_over(void) {
+  static const char text[] =
+      "<problem name='shelf' model='" CAVORT_SOURCE_ROOT
+      "/problems/models/humanoid.xml'><scene><geom name='shelf' type='box' pos='1.62 0 1.185' size='.15 .4 .015'/>"
+      "<body name='parcel' pos='1.34 0 .85'><freejoint name='parcel'/><geom type='box' size='.1 .15 .1' "
+      "mass='4'/></body>"
+      "</scene><horizon duration='3'/><start key='stand' height='floor'><root joint='parcel' "
+      "height='keep'/></start><goal key='stand' height='floor'>"
+      "<root joint='parcel' pos='1.56 0 1.3' height='keep'/></goal><schedule solids='grow'/><cost><posture dofs='all' "
+      "at='end' "
+      "weight='900'/></cost></problem>";
+  cav_error error = {0};
+  cav_problem *p = strategy_problem(text);
+  cav_trajectory *way = p ? cav_problem_guess(p, &error) : NULL;
+  cav_state *state = p ? cav_state_new(p->model) : NULL;
+  if (CHECK(way && state)) {
+    const int parcel = way->nq - 7;
+    double deep = 0, moved = 0;
+    for (int t = 0; t < way->nknot; t++) {
+      const double *q = way->q + (size_t)t * (size_t)way->nq;
+      moved = fmax(moved, fabs(q[2] - p->q_start[2]));
+      CHECK(cav_position(p->model, state, q) == CAV_OK);
+      for (int i = 0; i < state->ncontact; i++) {
+        const cav_contact *c = &state->contact[i];
+        if (c->link1 == 0 && c->link2 == p->model->nlink - 1) deep = fmax(deep, -c->dist);
+      }
+    }
+    CHECK(moved < 1e-9 && deep < 0.002 && p->q_goal[parcel] > 1.5);
+  }
+  cav_state_free(state);
+  cav_trajectory_free(way);
+  cav_problem_free(p);
+}
+
 // a file without a goal whose hand is wanted behind a wall is begun by a posture that has it there, round the wall, clear of
 // all; nothing of that where the straight way there is free, or the start's posture is asked for at the end too
 static void check_reach(void) {
@@ -554,6 +620,8 @@ int main(void) {
   check_file();
   check_solids();
   check_detour();
+  check_hoist();
+  check_thing_over();
   check_bypass();
   check_under();
   check_duck();

@@ -546,7 +546,49 @@ static void test_borne(void) {
   rmdir(folder);
 }
 
+/// The cost on forces of a bar is a hundredth of itself at first, and whole in the end; that of all contacts is whole throughout.
+static void test_lightened(void) {
+  for (int bar = 0; bar < 2; bar++) {
+    char text[1000];
+    snprintf(
+        text, sizeof text,
+        "<problem name='bar' model='" CAVORT_SOURCE_ROOT
+        "/problems/models/humanoid.xml'><scene><body name='bar'><geom name='bar' type='box' pos='.1 0 .01' size='.1 1 "
+        ".01'/></body></scene><horizon duration='.2' timestep='.02'/><start key='stand' height='floor' rise='.015'/>"
+        "<cost><force %s weight='100'/></cost></problem>",
+        bar ? "body='bar'" : "");
+    cav_problem *p = strategy_problem(text);
+    cav_error error = {0};
+    cav_trajectory *at = p ? cav_problem_guess(p, &error) : NULL;
+    if (!CHECK(at != NULL)) return;
+    int last = 0;
+    for (int i = 0; i < p->nterm; i++)
+      if (p->term[i].quantity == CAV_QUANTITY_FORCE) last = i;
+    CHECK(p->term[last].weight == 100 && (p->term[last].body > 0) == bar);
+    const int all = p->nterm;
+    p->term += last, p->nterm = 1;
+    cav_transcription *tr = cav_transcription_new(p, 1, &error);
+    double cost[2];
+    for (int k = 0; k < 2 && CHECK(tr != NULL); k++) {
+      cav_stage_set(p, 0, tr);
+      CHECK_NEAR(tr->lightened, 0.99, 1e-12);
+      if (k) tr->lightened = 0;
+      CHECK(cav_transcription_values(tr, at) == CAV_OK);
+      cost[k] = cav_transcription_cost(tr);
+    }
+    CHECK(cost[1] > 0);
+    CHECK_NEAR(cost[0] / cost[1], bar ? 0.01 : 1, 1e-12);
+    cav_stage_set(p, 1, tr);
+    CHECK(tr->lightened == 0);
+    cav_transcription_free(tr);
+    p->term -= last, p->nterm = all;
+    cav_trajectory_free(at);
+    cav_problem_free(p);
+  }
+}
+
 int main(void) {
+  test_lightened();
   test_through_ground();
   test_upright();
   test_cycle();

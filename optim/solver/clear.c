@@ -22,6 +22,9 @@ enum { STEPS = 500 };
 static const double reach = 0.3, level = 0.5;
 enum { GROUNDINGS = 5 };
 
+/// How often a thing is lifted at most.
+enum { PASSES = 5 };
+
 /// Depth in a solid from which a guess runs into it, m.
 static const double deep = 0.01;
 
@@ -184,8 +187,11 @@ static void go_below(cav_trajectory *at, const ways *w) {
       up = fmax(up, w->up[t]), down = fmax(down, w->down[t]);
       if (w->down[t] >= 0) last = t;
     }
+    // a thing that is put on a shelf from below does not go on below it; limbs may brush what is passed below
+    const int through = w->tree && (w->down[first] > w->up[first] || w->down[last] > w->up[last]);
+    const int below = down <= up && !through;
     for (int t = first; t <= last; t++) {
-      if (down <= up) {
+      if (below) {
         raise_by(w, -w->up[t] - fmax(w->down[t], 0), at->q + (size_t)t * at->nq);
         w->up[t] = 0;
       } else {
@@ -215,16 +221,22 @@ static void follow_course(cav_trajectory *at, const ways *w, const double *least
   }
 }
 
-/// Clears a tree that nothing moves, or all that actuators do: 0.
+/// Clears all that actuators move, tree 0, or a thing: anew where a smooth course lifts it into what is over its way.
 static cav_status clear_tree(ways *w, int tree, cav_trajectory *at, double *before) {
-  memset(w->up, 0, 4 * (size_t)w->n * sizeof *w->up);
+  cav_status status = CAV_OK;
+  double most = 1;
   w->tree = tree;
-  const cav_status status = find_ways(w, at, before);
-  if (status) return status;
-  go_below(at, w);
-  follow_course(at, w, w->up, 1);
-  follow_course(at, w, w->down, -1);
-  return CAV_OK;
+  for (int pass = 0; pass < (tree ? PASSES : 1) && most > 0 && !status; pass++) {
+    memset(w->up, 0, 4 * (size_t)w->n * sizeof *w->up);
+    status = find_ways(w, at, before);
+    if (status) break;
+    go_below(at, w);
+    most = 0;
+    for (int t = 0; t < w->n; t++) most = fmax(most, fmax(w->up[t], w->down[t]));
+    follow_course(at, w, w->up, 1);
+    follow_course(at, w, w->down, -1);
+  }
+  return status;
 }
 
 /// Whether something lifts a tree that nothing moves, or any that actuators do: 0.

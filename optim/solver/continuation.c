@@ -46,6 +46,9 @@ static double between(double from, double to, double s) {
 // found by then, and what is still on its way is not held against what it has to leave anyway
 static const double STOPS_FROM = 0.5;
 
+// part of the cost on forces of what is to be avoided in the world, at first: soft contacts press from afar, where nothing touches
+static const double avoided = 0.01;
+
 void cav_stage_set(const cav_problem *problem, double x, cav_transcription *tr) {
   cav_stage_law(problem, x, tr->options.timestep, &tr->options);
   tr->options.stops = x >= STOPS_FROM && problem->close_at_rest && !problem->cycle.on;
@@ -53,6 +56,7 @@ void cav_stage_set(const cav_problem *problem, double x, cav_transcription *tr) 
   tr->penalty.effort = between(penalised.effort, PENALTY_RISE * penalised.effort, x);
   tr->penalty.range = between(penalised.range, PENALTY_RISE * penalised.range, x);
   tr->penalty.unactuated = cav_schedule_at(&problem->schedule, x).penalty;
+  tr->lightened = 1 - between(avoided, 1, x);
   tr->depth_weight = problem->schedule.solids == CAV_SOLIDS_GROW ? depth_weight : 0;
   // nothing has pushed a body out of the floor before its first knot
   if (problem->free_start && cav_problem_has_record(problem))
