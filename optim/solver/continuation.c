@@ -46,7 +46,8 @@ static double between(double from, double to, double s) {
 // found by then, and what is still on its way is not held against what it has to leave anyway
 static const double STOPS_FROM = 0.5;
 
-// part of the cost on forces of what is to be avoided in the world, at first: soft contacts press from afar, where nothing touches
+// part of the cost on forces of what is to be avoided in the world, at first: soft contacts press from afar, where nothing
+// touches
 static const double avoided = 0.01;
 
 void cav_stage_set(const cav_problem *problem, double x, cav_transcription *tr) {

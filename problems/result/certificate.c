@@ -58,8 +58,7 @@ int cav_certificate_lines(const cav_verdict *v, cav_certificate_line line[CAV_CE
   if (v->periods > 1)
     add_number(line, &n, "end of the cycle on its start", v->periodicity_error, CAV_TOLERANCE_PERIODICITY, 1, "");
   if (!isnan(v->mirrored_force_max))
-    add_number(line, &n, "mirrored half stride, off by", v->mirrored_force_max, CAV_TOLERANCE_MIRRORED,
-               100, " %");
+    add_number(line, &n, "mirrored half stride, off by", v->mirrored_force_max, CAV_TOLERANCE_MIRRORED, 100, " %");
   add_number(line, &n, "penetration", v->penetration_max_m, CAV_TOLERANCE_PENETRATION, 1e3, " mm");
   add_number(line, &n, "penetration between knots", v->penetration_between_m, CAV_TOLERANCE_PENETRATION, 1e3, " mm");
   add_number(line, &n, "slip of loaded contacts, mean", v->slip_mean_m_s, CAV_TOLERANCE_SLIP, 1e3, " mm/s");
