@@ -508,8 +508,8 @@ typedef struct cav_verdict {
   double
       periodicity_error; ///< cycles: how far the last knot is from the first one moved, m, rad, or their rates; else 0
   /// Mirrored cycles of a model that is its own mirror image but for millimetres of its masses, in the other half stride:
-  /// unactuated force, fraction of weight, or effort beyond its planned limit, fraction of that, whichever is more. Feedback makes
-  /// it up. Else NaN.
+  /// unactuated force, fraction of weight, or effort beyond its planned limit, fraction of that, whichever is more. Feedback
+  /// makes it up. Else NaN.
   double mirrored_force_max;
   int periods; ///< that the closed loop ran for: 1, of cycles more
   double end_speed_m_s,
