@@ -561,12 +561,19 @@ static void test_lightened(void) {
     cav_error error = {0};
     cav_trajectory *at = p ? cav_problem_guess(p, &error) : NULL;
     if (!CHECK(at != NULL)) return;
-    int last = 0;
+    cav_strategy strategy[CAV_STRATEGIES];
+    int n, last = 0;
+    CHECK(cav_strategy_list(p, strategy, &n) == CAV_OK);
+    const cav_strategy *avoid = strategy_find(strategy, n, "avoid");
+    CHECK((avoid != NULL) == bar && !p->schedule.light_avoided);
+    if (avoid) CHECK(avoid->schedule.light_avoided && !strcmp(avoid->changed, "light_avoided=\"true\""));
+    cav_strategies_clear(strategy, n);
     for (int i = 0; i < p->nterm; i++)
       if (p->term[i].quantity == CAV_QUANTITY_FORCE) last = i;
     CHECK(p->term[last].weight == 100 && (p->term[last].body > 0) == bar);
     const int all = p->nterm;
     p->term += last, p->nterm = 1;
+    p->schedule.light_avoided = 1;
     cav_transcription *tr = cav_transcription_new(p, 1, &error);
     double cost[2];
     for (int k = 0; k < 2 && CHECK(tr != NULL); k++) {

@@ -168,6 +168,11 @@ void cav_term_target(const cav_term *term, double time, int dim, double *target)
 
 int cav_term_asks(const cav_term *term) { return term->use != CAV_USE_COST || term->weight > 0; }
 
+int cav_term_avoids(const cav_model *m, const cav_term *term) {
+  return term->quantity == CAV_QUANTITY_FORCE && term->use == CAV_USE_COST && term->body > 0 &&
+         m->body[term->body].link == 0;
+}
+
 int cav_term_placed(const cav_model *model, const cav_term *term) {
   const cav_sensor *s = &term->sensor;
   const int is = term->quantity == CAV_QUANTITY_SENSOR && s->type == CAV_SENSOR_FRAMEPOS && !s->referred;

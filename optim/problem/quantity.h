@@ -49,6 +49,9 @@ void cav_term_target(const cav_term *term, double time, int dim, double *target)
 /// Whether a term asks for anything: it is no cost without a weight.
 int cav_term_asks(const cav_term *term);
 
+/// Whether it is a cost on the forces of a body of the world, which says that this is to be avoided.
+int cav_term_avoids(const cav_model *model, const cav_term *term);
+
 /// The link whose place in the world a term is of, 0: the world; -1: it is of no place.
 int cav_term_placed(const cav_model *model, const cav_term *term);
 

@@ -420,6 +420,7 @@ static void write_tail(FILE *out, const cav_problem *p) {
   write_text(out, "next_slip", cav_problem_next_slips[p->schedule.next_slip]);
   write_text(out, "solids", cav_problem_solids[p->schedule.solids]);
   if (p->schedule.kinematics) write_text(out, "kinematics", "true");
+  if (p->schedule.light_avoided) write_text(out, "light_avoided", "true");
   if (p->schedule.optimality > 0) write_number(out, "optimality", p->schedule.optimality);
   fputs(">\n", out);
   write_stage(out, "first", &p->schedule.first);

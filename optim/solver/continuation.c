@@ -57,7 +57,7 @@ void cav_stage_set(const cav_problem *problem, double x, cav_transcription *tr) 
   tr->penalty.effort = between(penalised.effort, PENALTY_RISE * penalised.effort, x);
   tr->penalty.range = between(penalised.range, PENALTY_RISE * penalised.range, x);
   tr->penalty.unactuated = cav_schedule_at(&problem->schedule, x).penalty;
-  tr->lightened = 1 - between(avoided, 1, x);
+  tr->lightened = problem->schedule.light_avoided ? 1 - between(avoided, 1, x) : 0;
   tr->depth_weight = problem->schedule.solids == CAV_SOLIDS_GROW ? depth_weight : 0;
   // nothing has pushed a body out of the floor before its first knot
   if (problem->free_start && cav_problem_has_record(problem))

@@ -17,6 +17,7 @@
 #include "leap.h"
 #include "periodicity.h"
 #include "pump.h"
+#include "quantity.h"
 #include "reach.h"
 #include "sampling.h"
 #include "upright.h"
@@ -274,8 +275,21 @@ static void begin_changed(cav_strategy *strategy, int n) {
     strategy[i] = strategy[0];
     strategy[i].name = kept.name, strategy[i].text = kept.text, strategy[i].term = kept.term,
     strategy[i].nterm = kept.nterm, strategy[i].timestep = kept.timestep;
+    strategy[i].schedule.light_avoided = kept.schedule.light_avoided;
     memcpy(strategy[i].changed, kept.changed, sizeof kept.changed);
   }
+}
+
+/// With costs on the forces of what is to be avoided that grow over the stages: soft contacts press from afar.
+static void add_avoiding(const cav_problem *problem, cav_strategy *strategy, int *n, const cav_strategy *stated) {
+  cav_strategy light = *stated;
+  int avoids = 0;
+  for (int i = 0; i < problem->nterm; i++) avoids |= cav_term_avoids(problem->model, &problem->term[i]);
+  if (!avoids || problem->schedule.light_avoided) return;
+  light.schedule.light_avoided = 1;
+  snprintf(light.changed, sizeof light.changed, "light_avoided=\"true\"");
+  add(strategy, n, &light, "avoid", "as the first one, with costs on what is to be avoided that grow over the stages");
+  add_near(strategy, n, stated, MEND);
 }
 
 /// The stated guess, which is begun without the joints that its postures would have beyond the model's ranges, then with them
@@ -479,6 +493,7 @@ cav_status cav_strategy_list(const cav_problem *problem, cav_strategy strategy[C
   guesses g;
   int swings_up;
   cav_status status = add_stated(problem, strategy, n, &stated);
+  if (status == CAV_OK) add_avoiding(problem, strategy, n, &stated);
   if (status == CAV_OK) status = find_guesses(problem, &stated, strategy, &g);
   if (status == CAV_OK) status = add_pushed(problem, strategy, n, &stated, &g);
   if (status == CAV_OK && !cav_upright_held(problem)) status = add_upright(problem, strategy, n, &stated);

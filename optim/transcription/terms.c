@@ -59,9 +59,7 @@ void cav_term_windows(cav_transcription *tr) {
 double cav_term_weight(const cav_transcription *tr, const cav_term *term, int t) {
   const cav_window *w = cav_term_window(tr, term);
   if (t < w->first || t > w->last) return 0;
-  const int avoids = term->quantity == CAV_QUANTITY_FORCE && term->use == CAV_USE_COST && term->body > 0 &&
-                     tr->model->body[term->body].link == 0;
-  return (w->single ? 1 : tr->options.timestep) * (avoids ? 1 - tr->lightened : 1);
+  return (w->single ? 1 : tr->options.timestep) * (cav_term_avoids(tr->model, term) ? 1 - tr->lightened : 1);
 }
 
 int cav_term_is_reading(const cav_term *term) {
