@@ -566,14 +566,21 @@ static int misses_rest(const cav_race *race) {
          r->verdict.unactuated_force_knot >= near_end * last;
 }
 
+// whether a strategy is of no use: costs that are light at first serve where forces or limits do not come in
+static int is_idle(const cav_race *race, int i) {
+  const cav_race_report *first = &race->entry[0].report;
+  const int eased = race->entry[i].strategy.schedule.light_avoided && !race->problem->schedule.light_avoided;
+  return eased && first->solution && cav_verdict_feasible(&first->verdict);
+}
+
 // whether a strategy that waits may start: those for a case only after all before them
 static int may_start(const cav_race *race, int i) {
   cav_strategy_use use = race->entry[i].strategy.use;
   int momentum = 0, success = 0;
-  if (use == CAV_STRATEGY_TRY) return 1;
+  if (use == CAV_STRATEGY_TRY) return !is_idle(race, i);
   for (int k = 0; k < i; k++) {
     const cav_race_entry *e = &race->entry[k];
-    int waits = e->state == CAV_RACE_WAITING && (e->strategy.use == CAV_STRATEGY_TRY || may_start(race, k));
+    const int waits = e->state == CAV_RACE_WAITING && may_start(race, k);
     if (waits || e->state == CAV_RACE_RUNNING) return 0;
     momentum |= e->state == CAV_RACE_DONE && misses_momentum(&e->report);
     success |= e->state == CAV_RACE_DONE && cav_race_success(&e->report);
