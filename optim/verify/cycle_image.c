@@ -36,8 +36,8 @@ struct cav_cycle_image {
   double map[9], determinant, centre[3], translation[3];
   joint_image *joint; // [njoint]
   double *frame;      // [nlink*9] S of links
-  double *uneven;    // [nlink*3] centre of mass of the counterpart, in its frame, from where the image of the link's is
-  double unevenness; // m, the longest of them
+  double *offset; // [nlink*3] centre of mass of the counterpart, in its frame, from where the image of the link's is
+  int uneven;     // 1: masses are not images of each other
 };
 
 // ---------------------------------------------------------------- matrices, row-major
@@ -156,7 +156,7 @@ double cav_cycle_image_error(const cav_cycle_image *image, int link, const cav_p
   int other = model->joint[image->joint[model->link[link].joint].joint].link;
   double at[3], a[9], b[9], distance = 0, chord = 0;
   map_point(image, com + 3 * link, at);
-  map_vector(state->link[other].rotation, image->uneven + 3 * link, a);
+  map_vector(state->link[other].rotation, image->offset + 3 * link, a);
   for (int k = 0; k < 3; k++) at[k] += a[k];
   for (int k = 0; k < 3; k++) distance += pow(at[k] - state->com[3 * other + k], 2);
   product(image->map, pose[link].rotation, a);
@@ -166,7 +166,7 @@ double cav_cycle_image_error(const cav_cycle_image *image, int link, const cav_p
   return fmax(sqrt(distance), 2 * asin(fmin(sqrt(chord / 8), 1)));
 }
 
-double cav_cycle_image_unevenness(const cav_cycle_image *image) { return image->unevenness; }
+int cav_cycle_image_is_uneven(const cav_cycle_image *image) { return image->uneven; }
 
 // ---------------------------------------------------------------- counterparts
 
@@ -263,22 +263,46 @@ static cav_status read_frames(cav_cycle_image *image, const cav_state *state, ca
   return CAV_OK;
 }
 
-// how far centres of mass are from images of each other, of trees that float: what files leave open is none of it
-static void read_unevenness(cav_cycle_image *image, const cav_state *state) {
+// inertia of a link about its centre of mass, world axes
+static void turn_inertia(const cav_link *link, const double *rotation, double *out) {
+  const double *i = link->inertia, own[9] = {i[0], i[3], i[4], i[3], i[1], i[5], i[4], i[5], i[2]};
+  double back[9], half[9];
+  transpose(rotation, back);
+  product(own, back, half);
+  product(rotation, half, out);
+}
+
+// whether masses and inertia of a link and its counterpart are images of each other, but for what files leave open
+static int is_image(const cav_cycle_image *image, const cav_state *state, int link, int other) {
+  const cav_link *mine = &image->model->link[link], *yours = &image->model->link[other];
+  double inertia[9], half[9], back[9], mapped[9], there[9], most = 0,
+                                                            off = fabs(mine->mass - yours->mass) / yours->mass;
+  turn_inertia(mine, state->link[link].rotation, inertia);
+  turn_inertia(yours, state->link[other].rotation, there);
+  transpose(image->map, back);
+  product(inertia, back, half);
+  product(image->map, half, mapped);
+  for (int k = 0; k < 9; k++) most = fmax(most, fabs(there[k]));
+  for (int k = 0; k < 9; k++) off = fmax(off, fabs(mapped[k] - there[k]) / most);
+  return !(off > near);
+}
+
+// what masses are off by, and centres of mass of trees that float
+static void read_masses(cav_cycle_image *image, const cav_state *state) {
   const cav_model *model = image->model;
   for (int l = 1; l < model->nlink; l++) {
     const int root = model->link[l].root, other = model->joint[image->joint[model->link[l].joint].joint].link;
+    image->uneven |= !is_image(image, state, l, other);
     if (model->joint[model->link[root].joint].type != CAV_JOINT_FREE) continue;
     const double *from = state->link[root].pos, *to = state->link[model->link[other].root].pos;
     double arm[3], at[3], back[9];
     for (int k = 0; k < 3; k++) arm[k] = state->com[3 * l + k] - from[k];
     map_vector(image->map, arm, at);
     for (int k = 0; k < 3; k++) arm[k] = state->com[3 * other + k] - to[k] - at[k];
-    const double length = sqrt(arm[0] * arm[0] + arm[1] * arm[1] + arm[2] * arm[2]);
-    if (length < near) continue;
+    if (arm[0] * arm[0] + arm[1] * arm[1] + arm[2] * arm[2] < near * near) continue;
     transpose(state->link[other].rotation, back);
-    map_vector(back, arm, image->uneven + 3 * l);
-    image->unevenness = fmax(image->unevenness, length);
+    map_vector(back, arm, image->offset + 3 * l);
+    image->uneven = 1;
   }
 }
 
@@ -341,10 +365,10 @@ cav_cycle_image *cav_cycle_image_new(const cav_problem *problem, cav_error *erro
     image->model = model;
     image->joint = calloc((size_t)model->njoint + 1, sizeof *image->joint);
     image->frame = calloc((size_t)model->nlink, 9 * sizeof *image->frame);
-    image->uneven = calloc((size_t)model->nlink, 3 * sizeof *image->uneven);
+    image->offset = calloc((size_t)model->nlink, 3 * sizeof *image->offset);
   }
   cav_status status = CAV_OK;
-  if (!image || !state || !image->joint || !image->frame || !image->uneven)
+  if (!image || !state || !image->joint || !image->frame || !image->offset)
     status = refuse(error, CAV_NO_MEMORY, "not enough memory for the cycle");
   if (status == CAV_OK && problem->cycle.mirror != CAV_MIRROR_NONE && problem->cycle.rotation != 0)
     status = refuse(error, CAV_BAD_INPUT, "a mirrored cycle cannot turn");
@@ -357,7 +381,7 @@ cav_cycle_image *cav_cycle_image_new(const cav_problem *problem, cav_error *erro
     } else {
       status = pair_joints(image, &problem->cycle, error);
       if (status == CAV_OK) status = read_frames(image, state, error);
-      if (status == CAV_OK) read_unevenness(image, state);
+      if (status == CAV_OK) read_masses(image, state);
     }
   }
   if (status == CAV_OK) status = read_shifts(image, &problem->cycle, state, error);
@@ -371,6 +395,6 @@ void cav_cycle_image_free(cav_cycle_image *image) {
   if (!image) return;
   free(image->joint);
   free(image->frame);
-  free(image->uneven);
+  free(image->offset);
   free(image);
 }

@@ -18,9 +18,8 @@ void cav_cycle_image_configuration(const cav_cycle_image *image, const double *q
 /// Tangent or generalised force [nv] one period on (way 1) or back (way -1): the map is orthogonal. out may not be v.
 void cav_cycle_image_tangent(const cav_cycle_image *image, int way, const double *v, double *out);
 
-/// How far centres of mass of links are at most from where they would be if the model were its own mirror image, m; less than
-/// rounding is 0.
-double cav_cycle_image_unevenness(const cav_cycle_image *image);
+/// Whether masses of links, their centres or inertia are not images of each other, as those of robots are not quite.
+int cav_cycle_image_is_uneven(const cav_cycle_image *image);
 
 /// How far the links are at two configurations from being images of each other: pose at q is [nlink] poses and com
 /// [3*nlink] centres of mass, the other those of the state. Distance of centres of mass, but for the model's own unevenness, m,

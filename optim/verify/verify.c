@@ -164,7 +164,7 @@ static cav_status examine_image(const cav_verification *verification, int t, dou
   cav_verification_penetration(verification, t, suffix, &found->penetration);
   if (t >= verification->rows) return CAV_OK;
   metrics apart = {.unactuated = found->mirrored, .limit = found->mirrored};
-  const int uneven = cav_cycle_image_unevenness(verification->image) > 0;
+  const int uneven = cav_cycle_image_is_uneven(verification->image);
   note_forces(verification, t, v, u, control, scratch, suffix, uneven ? &apart : found);
   if (uneven) found->mirrored = apart.unactuated.value > apart.limit.value ? apart.unactuated : apart.limit;
   return CAV_OK;
@@ -372,7 +372,7 @@ static void fill(const cav_verification *verification, const metrics *found, con
   verdict->model_contacts_end_error_m = replay->own.error;
   verdict->periodicity_error = found->periodicity.value;
   verdict->mirrored_force_max = NAN;
-  if (verification->image && cav_cycle_image_unevenness(verification->image) > 0)
+  if (verification->image && cav_cycle_image_is_uneven(verification->image))
     verdict->mirrored_force_max = found->mirrored.value;
   verdict->periods = verification->periods;
   verdict->duration = verification->last * verification->h;
