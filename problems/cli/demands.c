@@ -31,16 +31,17 @@ static int placed(const cav_problem *p, const cav_term *term) {
   return wanted ? cav_term_placed(p->model, term) : -1;
 }
 
-/// How far a link has to go for a term from where it starts, along the ground and in all, m.
-static void way_of(const cav_problem *p, const cav_term *term, cav_state *state, double way[2]) {
+/// How far a link has to go for a term from where it starts, along the ground, in all, and up, m.
+static void way_of(const cav_problem *p, const cav_term *term, cav_state *state, double way[3]) {
   double at[CAV_SENSOR_DIM_MAX];
-  way[0] = way[1] = 0;
+  way[0] = way[1] = way[2] = 0;
   cav_sensor_read(p->model, state, &term->sensor, at);
   for (int k = 0; k < 3; k++) {
     if (term->component >= 0 && term->component != k) continue;
     const double d = fmax(fabs(term->target[k] - at[k]) - term->within, 0);
     if (k < 2) way[0] += d * d;
     way[1] += d * d;
+    if (k == 2 && term->target[k] > at[k]) way[2] = d;
   }
   for (int k = 0; k < 2; k++) way[k] = sqrt(way[k]);
 }
@@ -77,12 +78,13 @@ static double friction_of(const cav_model *m, const cav_state *state, int root) 
   return most;
 }
 
-static int tell_weight(FILE *out, const cav_problem *p, const cav_state *state, int link, double way) {
+/// way: along the ground, rise: up.
+static int tell_weight(FILE *out, const cav_problem *p, const cav_state *state, int link, double way, double rise) {
   const cav_model *m = p->model;
   const double g = hypot(hypot(m->gravity[0], m->gravity[1]), m->gravity[2]);
   const int thing = m->link[link].root;
   const double rubs = friction_of(m, state, thing), takes = rubs * cav_command_tree_mass(m, thing) * g;
-  if (m->link[thing].driven || !cav_command_floats(m, thing) || way < slides || !(takes > 0)) return 0;
+  if (m->link[thing].driven || !cav_command_floats(m, thing) || fmax(way, rise) < slides || !(takes > 0)) return 0;
   double holds = 0, mass = 0;
   int feet = 0;
   for (int root = 1; root < m->nlink; root++) {
@@ -91,6 +93,16 @@ static int tell_weight(FILE *out, const cav_problem *p, const cav_state *state, 
     if (!cav_command_floats(m, root)) return 0;
     holds += friction_of(m, state, root) * cav_command_tree_mass(m, root) * g, mass += cav_command_tree_mass(m, root),
         feet = root;
+  }
+  if (rise > way) {
+    const double weighs = cav_command_tree_mass(m, thing) * g;
+    if (!(mass > 0) || weighs < mass * g) return 0;
+    fprintf(out,
+            "note: to lift '%.60s' (%.3g kg) takes %.3g N; '%.60s' and all that hangs on it, which has to hold it, is "
+            "%.3g kg: "
+            "a lighter thing, or one that slides\n",
+            name_of(m, thing), cav_command_tree_mass(m, thing), weighs, name_of(m, feet), mass);
+    return 1;
   }
   if (!(holds > 0) || takes < held * holds) return 0;
   fprintf(
@@ -108,10 +120,10 @@ int cav_command_tell_demands(FILE *out, const cav_problem *p) {
   const int placeable = state && cav_position(p->model, state, p->q_start) == CAV_OK;
   for (int i = 0; i < p->nterm && placeable; i++) {
     const int link = placed(p, &p->term[i]);
-    double way[2];
+    double way[3];
     if (link <= 0) continue;
     way_of(p, &p->term[i], state, way);
-    n += tell_haste(out, p, &p->term[i], link, way[1]) + tell_weight(out, p, state, link, way[0]);
+    n += tell_haste(out, p, &p->term[i], link, way[1]) + tell_weight(out, p, state, link, way[0], way[2]);
   }
   cav_state_free(state);
   return n;
