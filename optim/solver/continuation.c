@@ -48,7 +48,7 @@ static const double STOPS_FROM = 0.5;
 
 // part of the cost on forces of what is to be avoided in the world, at first: soft contacts press from afar, where nothing
 // touches
-static const double avoided = 0.01;
+static const double avoided = 0.3;
 
 void cav_stage_set(const cav_problem *problem, double x, cav_transcription *tr) {
   cav_stage_law(problem, x, tr->options.timestep, &tr->options);
