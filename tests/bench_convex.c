@@ -8,6 +8,7 @@
 #include "hull.h"
 #include "proof.h"
 #include "scene.h"
+#include "solid.h"
 
 #ifdef CAVORT_HAVE_CCD
 #include <ccd/ccd.h>
@@ -17,8 +18,7 @@ enum { NEAR, TOUCHING, SHALLOW, DEEP, NEEDLE, RATIO, PARALLEL, KINDS, POSES_MAX 
 static const char *const kinds[KINDS] = {"near", "touching", "shallow", "deep", "needle", "ratio", "parallel"};
 static const char *const names[] = {"plane", "sphere", "capsule", "ellipsoid", "cylinder", "box", "mesh"};
 
-static double uniform(double low, double high) { return low + (high - low) * (scene_uniform() + 1) / 2; }
-static double spread(double low, double high) { return exp(uniform(log(low), log(high))); }
+static double spread(double low, double high) { return exp(scene_between(log(low), log(high))); }
 
 static double now(void) {
   struct timespec t;
@@ -26,20 +26,15 @@ static double now(void) {
   return (double)t.tv_sec * 1e6 + (double)t.tv_nsec * 1e-3;
 }
 
-/// A shape with room for what it points to.
-typedef struct solid {
-  double size[3];
-  cav_hull hull;
-  cav_mesh mesh;
-  cav_shape shape;
-} solid;
-
 // --- poses ---
 
 // few points, many, a box, a wedge, a prism
 static void make_mesh(solid *s) {
   double point[300];
-  int form = (int)uniform(0, 4.999), n = form == 0 ? 4 + (int)uniform(0, 8) : form == 1 ? 100 : form == 2 ? 8 : 12;
+  int form = (int)scene_between(0, 4.999), n = form == 0   ? 4 + (int)scene_between(0, 8)
+                                               : form == 1 ? 100
+                                               : form == 2 ? 8
+                                                           : 12;
   if (form == 3) n = 6;
   for (int i = 0; i < n; i++) {
     double x[3] = {scene_uniform(), scene_uniform(), scene_uniform()};
@@ -61,15 +56,15 @@ static void random_solid(solid *s, int type, int kind, double scale) {
   double q[4];
   *s = (solid){.shape.type = (cav_geom_type)type};
   s->shape.size = s->size;
-  for (int k = 0; k < 3; k++) s->size[k] = scale * uniform(0.05, 0.3);
+  for (int k = 0; k < 3; k++) s->size[k] = scale * scene_between(0.05, 0.3);
   if (kind == NEEDLE) {
-    int thin = (int)uniform(0, 2.999);
+    int thin = (int)scene_between(0, 2.999);
     s->size[thin] = scale * spread(3e-4, 0.015);
-    if (uniform(0, 1) < 0.5) s->size[(thin + 1) % 3] = scale * spread(3e-4, 0.015);
+    if (scene_between(0, 1) < 0.5) s->size[(thin + 1) % 3] = scale * spread(3e-4, 0.015);
   }
   if (type == CAV_GEOM_MESH) make_mesh(s);
   for (int k = 0; k < 4; k++) q[k] = scene_uniform();
-  if (kind == PARALLEL) memcpy(q, turns[(int)uniform(0, 5.999)], sizeof q);
+  if (kind == PARALLEL) memcpy(q, turns[(int)scene_between(0, 5.999)], sizeof q);
   quat_normalise(q);
   quat_matrix(s->shape.rotation, q);
   for (int k = 0; k < 3; k++) s->shape.pos[k] = scene_uniform();
@@ -86,19 +81,19 @@ static double extreme(const solid *s, int largest) {
 
 static void place(const solid *a, solid *b, int kind) {
   double n[3] = {scene_uniform(), scene_uniform(), scene_uniform()}, x[3], y[3], back[3], d[3];
-  double small = fmin(extreme(a, 0), extreme(b, 0)), gap = small * uniform(-0.1, 0.1);
-  if (kind == DEEP || ((kind == NEEDLE || kind == RATIO) && uniform(0, 1) < 0.3)) {
+  double small = fmin(extreme(a, 0), extreme(b, 0)), gap = small * scene_between(-0.1, 0.1);
+  if (kind == DEEP || ((kind == NEEDLE || kind == RATIO) && scene_between(0, 1) < 0.3)) {
     double r = kind == DEEP ? 0.3 * fmin(extreme(a, 1), extreme(b, 1)) : small;
     for (int k = 0; k < 3; k++) b->shape.pos[k] = a->shape.pos[k] + r * scene_uniform();
     return;
   }
   if (kind == PARALLEL) {
-    int axis = (int)uniform(0, 2.999);
+    int axis = (int)scene_between(0, 2.999);
     set3(n, axis == 0, axis == 1, axis == 2);
   }
   normalise3(n);
-  if (kind == NEAR) gap = uniform(-0.04, 0.04);
-  if (kind == TOUCHING || (kind == PARALLEL && uniform(0, 1) < 0.3)) gap = 0;
+  if (kind == NEAR) gap = scene_between(-0.04, 0.04);
+  if (kind == TOUCHING || (kind == PARALLEL && scene_between(0, 1) < 0.3)) gap = 0;
   scale3(back, -1, n);
   cav_shape_support(&a->shape, n, x);
   cav_shape_support(&b->shape, back, y);

@@ -154,7 +154,7 @@ static void find_sides(const hands *h, const cav_pose *body, double away, double
 
 /// Where they push it from, in the world: opposite to the way, side by side, where it does not tip.
 static void find_back(const hands *h, double away, double place[2][3]) {
-  static const double up[3] = {0, 0, 1};
+  static const double up[3] = {0, 0, 1}, down[3] = {0, 0, -1};
   double n[3] = {-h->thing.way[0], -h->thing.way[1], 0}, ahead[3], across[3], centre[3], lowest, none;
   normalise3(n);
   scale3(ahead, -1, n);
@@ -171,9 +171,11 @@ static void find_back(const hands *h, double away, double place[2][3]) {
     cav_object_pose(h->m, h->state, CAV_OBJECT_GEOM, h->geom[k], &hand);
     axpy3(place[k], centre, depth + away * cav_geom_reach(h->m, h->geom[k], &hand, ahead), n);
     axpy3(place[k], place[k], k ? -apart : apart, across);
-    const double thick = cav_geom_reach(h->m, h->geom[k], &hand, up), tips = lowest + steady * edge / h->friction;
+    const double over = cav_geom_reach(h->m, h->geom[k], &hand, up),
+                 under = cav_geom_reach(h->m, h->geom[k], &hand, down);
+    const double tips = lowest + steady * edge / h->friction;
     const double high = h->thing.joint < 0 ? fmin(h->at[k][2], tips) : h->at[k][2];
-    place[k][2] = fmax(fmin(high, top - thick), lowest + thick);
+    place[k][2] = fmax(fmin(high, top - over), lowest + under);
   }
 }
 

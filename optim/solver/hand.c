@@ -70,6 +70,7 @@ static cav_status find_geom(const cav_model *m, cav_state *state, const double *
 /// Where a geom pushes a thing from, at the start, in the frame of the thing's body.
 static void find_place(const cav_model *m, const cav_state *state, const cav_thing *t, int geom, double away,
                        double place[3]) {
+  static const double down[3] = {0, 0, -1};
   double back[3], ahead[3], centre[3], lowest, far[3];
   cav_pose hand, body;
   scale3(back, -1, t->way);
@@ -79,7 +80,7 @@ static void find_place(const cav_model *m, const cav_state *state, const cav_thi
   const double out = cav_thing_surface(m, state, t->link, back, centre, &lowest);
   cav_object_pose(m, state, CAV_OBJECT_GEOM, geom, &hand);
   axpy3(far, centre, out + away * cav_geom_reach(m, geom, &hand, ahead), back);
-  far[2] = fmax(far[2], lowest + hand.pos[2] - cav_geom_bottom(m, geom, &hand) + clear);
+  far[2] = fmax(far[2], lowest + cav_geom_reach(m, geom, &hand, down) + clear);
   cav_object_pose(m, state, CAV_OBJECT_XBODY, m->link[t->link].body, &body);
   sub3(far, far, body.pos);
   rotate_back(place, body.rotation, far);
