@@ -189,6 +189,12 @@ void cav_command_tell_guess(FILE *out, const cav_problem *problem, int whole);
 /// Tells of a step in which bodies fall far: milliseconds, perhaps, where seconds are meant. inspect.c.
 void cav_command_tell_step(FILE *out, const cav_problem *problem);
 
+/// How many of a model's actuators a motion can be planned with. inspect.c.
+int cav_command_count_planned(const cav_model *model);
+
+/// Prints what a problem asks for; all: with its equations and schedule. inspect_problem.c.
+cav_status cav_command_print_problem(const cav_problem *problem, int all, cav_error *error);
+
 /// Tells which equality constraints of the model a start that is given, or a goal, breaks by more than their softness
 /// explains, a line each; their number. equalities.c.
 int cav_command_tell_equalities(FILE *out, const cav_problem *problem);
