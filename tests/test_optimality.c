@@ -454,7 +454,44 @@ static void test_near_nothing(void) {
   }
 }
 
+// a ball that slides along the side of a slab whose middle is at a height
+static int make_sliding(bench *b, double height) {
+  char text[600];
+  snprintf(text, sizeof text,
+           "<mujoco><option gravity='0 0 0'/><worldbody><geom type='box' pos='1 0 %.17g' size='.2 .2 .03'/>"
+           "<body pos='.7 0 0'><joint name='x' type='slide' axis='1 0 0'/><joint name='z' type='slide' axis='0 0 1'/>"
+           "<geom type='sphere' size='.1' mass='1'/></body></worldbody>"
+           "<actuator><motor joint='x'/><motor joint='z'/></actuator></mujoco>",
+           height);
+  if (!make(b, text, 0.4, 10)) return 0;
+  add(b, CAV_USE_COST, CAV_QUANTITY_EDGE_FORCE)->weight = 10;
+  add(b, CAV_USE_COST, CAV_QUANTITY_VELOCITY)->weight = 10;
+  b->start[0] = b->goal[0] = 1e-4;
+  b->start[1] = -0.01;
+  end_at(b, b->start[0], 0.01);
+  return 1;
+}
+
+// What is said of its motion is the same with the slab's middle, where the nearness of its edges begins, at a knot and a
+// nanometre beside it, where a row more would be read.
+static void test_edge_begins(void) {
+  bench b;
+  if (!make_sliding(&b, 0)) return;
+  cav_solution *s = solve(&b);
+  cav_model_free(b.model);
+  double is[3], cost = NAN;
+  for (int k = 0; s && k < 3; k++) {
+    if (!make_sliding(&b, s->trajectory->q[5 * 2 + 1] + (k - 1) * 1e-9)) break;
+    is[k] = measure(&b.problem, s->trajectory, &s->contact, 0, NULL, &cost);
+    printf("%g nm from where an edge begins: cost %.6f, optimal to %.4e\n", k - 1.0, cost, is[k]);
+    CHECK(is[k] > 0 && is[k] < 1 && fabs(is[k] - is[0]) < 1e-3 * is[0]);
+    cav_model_free(b.model);
+  }
+  cav_solution_free(s);
+}
+
 int main(void) {
+  test_edge_begins();
   test_near_nothing();
   test_moved();
   test_other_cost();

@@ -127,7 +127,7 @@ static void test_both(void) {
     cav_problem *p = load(i ? "carton" : "crate");
     if (!p) continue;
     cav_carry c, leans;
-    CHECK(cav_carry_find(p, 1, &c) == CAV_OK && c.found && c.lifts == i);
+    CHECK(cav_carry_find(p, 1, &c) == CAV_OK && c.found && c.lifts == i && c.over == 0);
     CHECK(cav_carry_find(p, 0.7, &leans) == CAV_OK && leans.found == c.found);
     const int out = i; // the axis along which they press
     for (int k = 0; k < 2; k++) {
@@ -177,10 +177,10 @@ static void test_door(void) {
   for (int k = 0; k < 2; k++) CHECK_NEAR(c.there[k] - c.still[k], turned[k], 1e-12);
   CHECK_NEAR(c.still[0], 0.55, 1e-12);
   CHECK_NEAR(c.still[1], 0.05, 1e-12);
-  double *q = malloc(2 * (size_t)p->model->nq * sizeof *q);
-  cav_guess_pose pose[2];
+  double *q = malloc(CAV_CARRY_POSES * (size_t)p->model->nq * sizeof *q);
+  cav_guess_pose pose[CAV_CARRY_POSES];
   if (q) {
-    cav_carry_poses(p, &c, q, pose);
+    CHECK(cav_carry_poses(p, &c, q, pose) == 2);
     CHECK(pose[0].q[at] == p->q_start[at] && pose[1].q[at] == c.angle);
   }
   free(q);
@@ -203,6 +203,82 @@ static void test_door(void) {
   cav_problem placed = *p;
   placed.term = term;
   CHECK(cav_hand_find(&placed, 1, &hand) == CAV_OK && hand.found == 3 && !hand.hung);
+  cav_problem_free(p);
+}
+
+/// How deep the links that stand are in a table, with the root aside by a way along x, m.
+static double depth_in_table(const cav_problem *p, double aside) {
+  const cav_model *m = p->model;
+  const int table = cav_object_find(m, CAV_OBJECT_GEOM, "table");
+  cav_state *state = cav_state_new(m);
+  double *q = malloc((size_t)m->nq * sizeof *q), deepest = 0;
+  if (CHECK(state && q && table >= 0)) {
+    memcpy(q, p->q_start, (size_t)m->nq * sizeof *q);
+    q[0] += aside;
+    CHECK(cav_position(m, state, q) == CAV_OK);
+    for (int i = 0; i < state->ncontact; i++) {
+      const cav_pair *pair = &m->pair[state->contact[i].pair];
+      const int other = pair->geom1 == table ? pair->geom2 : pair->geom2 == table ? pair->geom1 : -1;
+      const char *body = other < 0 ? "box" : m->body[m->geom[other].body].name;
+      if (strcmp(body, "box") && !strstr(body, "arm") && !strstr(body, "hand"))
+        deepest = fmax(deepest, -state->contact[i].dist);
+    }
+  }
+  cav_state_free(state);
+  free(q);
+  return deepest;
+}
+
+/// A box far across a table: arms of 0.57 m do not reach it, and the body comes as near as the table lets it, in eighths of the
+/// way. It is lifted straight up.
+static void test_edge(void) {
+  cav_problem *p = load("table");
+  cav_carry c;
+  if (!p) return;
+  CHECK(cav_carry_find(p, 1, &c) == CAV_OK && c.found && c.lifts && c.over == 0);
+  const int hand = c.term[0].sensor.object;
+  cav_pose at, arm;
+  cav_state *state = cav_state_new(p->model);
+  if (CHECK(state && cav_position(p->model, state, p->q_start) == CAV_OK)) {
+    cav_object_pose(p->model, state, CAV_OBJECT_GEOM, hand, &at);
+    cav_object_pose(p->model, state, CAV_OBJECT_XBODY, cav_object_find(p->model, CAV_OBJECT_BODY, "upper_arm_right"),
+                    &arm);
+    // arms hang, nearly straight
+    const double far = hypot(hypot(at.pos[0] - arm.pos[0], at.pos[1] - arm.pos[1]), at.pos[2] - arm.pos[2]);
+    const double whole = 0.95 - p->q_start[0] - 0.9 * far;
+    CHECK(whole > 0.3 && c.come[0] > 0 && c.come[0] < whole);
+    CHECK_NEAR(c.come[1], 0, 1e-12);
+    CHECK(depth_in_table(p, c.come[0]) <= 1e-3 && depth_in_table(p, c.come[0] + whole / 8) > 1e-3);
+  }
+  cav_state_free(state);
+  cav_problem_free(p);
+}
+
+/// A box of 24 cm whose way along a table runs into a divider 6 cm high: it is led up by as much, less the centimetre that it may
+/// graze, in steps of 2 cm; along; and down.
+static void test_over(void) {
+  cav_problem *p = load("../unseen/shift-box");
+  cav_carry c;
+  if (!p) return;
+  CHECK(cav_carry_find(p, 1, &c) == CAV_OK && c.found && c.lifts && c.thing >= 0);
+  CHECK_NEAR(c.over, 0.06, 1e-12);
+  const int nq = p->model->nq, box = p->model->joint[c.thing].q;
+  double *q = malloc(CAV_CARRY_POSES * (size_t)nq * sizeof *q);
+  cav_guess_pose pose[CAV_CARRY_POSES];
+  if (CHECK(q && cav_carry_poses(p, &c, q, pose) == 4)) {
+    static const double y[] = {-0.22, -0.22, 0.22, 0.22}, z[] = {1.02, 1.08, 1.08, 1.02};
+    for (int i = 0; i < 4; i++) {
+      CHECK_NEAR(pose[i].q[box], 0.52, 1e-12);
+      CHECK_NEAR(pose[i].q[box + 1], y[i], 1e-12);
+      CHECK_NEAR(pose[i].q[box + 2], z[i], 1e-12);
+      if (i) CHECK(pose[i].time > pose[i - 1].time && pose[i].time <= p->duration);
+    }
+  }
+  free(q);
+  cav_strategy strategy[CAV_STRATEGIES];
+  int n;
+  CHECK(cav_strategy_list(p, strategy, &n) == CAV_OK && strategy[0].hand == 2);
+  cav_strategies_clear(strategy, n);
   cav_problem_free(p);
 }
 
@@ -247,6 +323,8 @@ int main(void) {
   test_touched();
   test_both();
   test_door();
+  test_edge();
+  test_over();
   test_begun();
   test_none();
   static const struct {

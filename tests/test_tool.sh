@@ -595,8 +595,23 @@ says out "touches the world with shin, ball; that of what actuators move in x 0.
 sed 's|<start height="floor"/>|<start height="floor"><root joint="ball" height="keep"/></start>|; s|pos="3 0 1.5"|& height="keep"|' toss.xml >kept.xml
 run 0 inspect kept.xml
 check "nothing is lowered" sh -c '! grep -q lowers out'
-says out "start  centre of mass at 0.000 0.000 0.771 m, touches the world with shin in x 0.000..0.000"
-says out "goal   centre of mass at 0.000 0.000 0.771 m, touches the world with shin in x 0.000..0.000"
+says out "start  centre of mass of what actuators move at 0.000 0.000 0.771 m, touches the world with shin in x 0.000..0.000"
+says out "goal   centre of mass of what actuators move at 0.000 0.000 0.771 m, touches the world with shin in x 0.000..0.000"
+
+# what is asked for along the ground: a block slides there where that is said, a ball may still roll
+sed 's|pos="2 0 1.2"|pos="2 0 .1"|; s|type="sphere" size=".1"|type="box" size=".1 .1 .1"|; s|<goal .*|<goal height="floor"><root joint="ball"|
+s|^pos="3 0 1.5"|pos="2.5 0 .1"|' toss.xml >slid.xml
+run 0 inspect slid.xml
+says out "note: 'ball' is asked for 0.5 m on: <slip body=\"ball\" weight=\"0\" within=\"any\"/> where it is to slide there"
+sed 's|<cost/>|<cost><slip body="ball" weight="0" within="any"/></cost>|' slid.xml >free.xml
+run 0 inspect free.xml
+check "nothing more to say of what slides" sh -c '! grep -q "is asked for" out'
+sed 's|type="box" size=".1 .1 .1"|type="sphere" size=".1"|' slid.xml >rolls.xml
+run 0 inspect rolls.xml
+says out "note: 'ball' is asked for 0.5 m on, and all is at rest after the last knot: <horizon close=\"open\"/> where it"
+sed 's|timestep="0.02"|& close="open"|' rolls.xml >open.xml
+run 0 inspect open.xml
+check "nothing more to say of what rolls" sh -c '! grep -q "is asked for" out'
 
 # a jump that does not pay, of a leg that cannot fall over: certified, and why it is not achieved
 cat >jumper.xml <<'END'

@@ -79,10 +79,21 @@ void cav_edges_free(cav_edges *edges) {
   free(edges);
 }
 
+// the geom of a pair that is of the world
+static int world_geom(const cav_model *model, const cav_pair *pair) {
+  return model->geom[pair->geom1].link == 0 ? pair->geom1 : pair->geom2;
+}
+
+int cav_edges_of_pair(const cav_model *model, const cav_edges *edges, const cav_pair *pair) {
+  const int index = world_geom(model, pair);
+  int any = 0;
+  for (int k = 0; edges && k < 6; k++) any |= edges->open[index][k];
+  return any && model->geom[index].link == 0 && model->geom[index].type == CAV_GEOM_BOX;
+}
+
 double cav_edge_nearness(const cav_model *model, const cav_edges *edges, const cav_contact *contact,
                          double gradient[3]) {
-  const cav_pair *pair = &model->pair[contact->pair];
-  const int index = model->geom[pair->geom1].link == 0 ? pair->geom1 : pair->geom2;
+  const int index = world_geom(model, &model->pair[contact->pair]);
   const cav_geom *box = &model->geom[index];
   if (gradient) set3(gradient, 0, 0, 0);
   if (box->link != 0 || box->type != CAV_GEOM_BOX) return 0;

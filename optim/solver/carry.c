@@ -5,8 +5,10 @@
 #include "carry.h"
 
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
+#include "clear.h"
 #include "extent.h"
 #include "math3.h"
 #include "quantity.h"
@@ -24,17 +26,22 @@ static const double steady = 0.9, within_width = 0.7, reached = 0.9;
 /// Cosine of a way that leads back to the base.
 static const double nearer = 0.5;
 
-/// Speed at which the base comes to it, m/s, and the way from which it has to, m.
-static const double pace = 0.8, least_step = 0.05;
+/// Speed at which the base comes to it, m/s, the way from which it has to, m, and how deep it may come into solids, m.
+static const double pace = 0.8, least_step = 0.05, shallow = 1e-3;
+
+/// m: as deep what is carried may come into solids on its way, by how much it is raised at a time, and at most; part of the time
+/// for which it is.
+static const double sunk = 0.01, higher = 0.02, highest = 0.6, raised = 0.3;
 
 /// What is known of the hands while places are found.
 typedef struct hands {
   const cav_model *m;
-  const cav_state *state; ///< at the start
+  cav_state *state; ///< at the start
   const cav_problem *problem;
   cav_thing thing;
   int geom[2];      ///< of the right and the left hand
   double at[2][3];  ///< m, where they are
+  int first[2];     ///< links that the arms begin with
   double reach;     ///< m, of an arm
   double toward[2]; ///< unit, along the ground, from the root to the body
   double friction;  ///< of the body on the ground
@@ -96,6 +103,22 @@ static int is_root_bound(const cav_problem *p, int root) {
   return hypot(b[0] - a[0], b[1] - a[1]) >= CAV_THING_WAY || is_asked_at_end(p, CAV_DOFS_ROOT_LINEAR);
 }
 
+/// Length of an arm when it is stretched, m: from the body that it begins with, by those in between, to where the hand is.
+static double arm_length(const hands *h, int hand, int first, const double at[3]) {
+  double end[3], length = 0;
+  copy3(end, at);
+  for (int i = hand; i > 0; i = h->m->body[i].parent) {
+    cav_pose pose;
+    double part[3];
+    cav_object_pose(h->m, h->state, CAV_OBJECT_XBODY, i, &pose);
+    sub3(part, end, pose.pos);
+    length += norm3(part);
+    copy3(end, pose.pos);
+    if (i == first) break;
+  }
+  return length;
+}
+
 /// Finds hands, arms and the way to the body; 0: there are none, or they cannot touch it.
 static int find_hands(hands *h, const cav_roles *roles, int root) {
   const cav_model *m = h->m;
@@ -108,10 +131,8 @@ static int find_hands(hands *h, const cav_roles *roles, int root) {
     if (h->geom[k] < 0 || roles->limb[role] < 0) return 0;
     cav_object_pose(m, h->state, CAV_OBJECT_GEOM, h->geom[k], &pose);
     copy3(h->at[k], pose.pos);
-    cav_object_pose(m, h->state, CAV_OBJECT_XBODY, roles->limb[role], &pose);
-    double arm[3];
-    sub3(arm, h->at[k], pose.pos);
-    h->reach = fmax(h->reach, norm3(arm));
+    h->first[k] = m->body[roles->limb[role]].link;
+    h->reach = fmax(h->reach, arm_length(h, m->geom[h->geom[k]].body, roles->limb[role], h->at[k]));
   }
   transform(body, h->state->link[h->thing.link].pos, h->state->link[h->thing.link].rotation,
             m->link[h->thing.link].com);
@@ -229,14 +250,54 @@ static int is_pulled(const hands *h) {
 }
 
 /// How far the root has to go for a place to be in reach, m: the way there, which it goes.
-static double step_to(const hands *h, double at[2], const double place[3], double way[2]) {
+static void step_to(const hands *h, double at[2], const double place[3], double way[2]) {
   const double d[2] = {place[0] - at[0], place[1] - at[1]}, far = hypot(d[0], d[1]), step = far - reached * h->reach;
   const double goes = step > least_step ? step : 0;
   for (int k = 0; k < 2; k++) way[k] = far > 0 ? goes * d[k] / far : 0, at[k] += way[k];
-  return goes;
 }
 
-static void find_carry(hands *h, double away, cav_carry *c) {
+/// Whether a link is of an arm.
+static int is_arm(const hands *h, int link) {
+  for (int i = link; i > 0; i = h->m->link[i].parent)
+    if (i == h->first[0] || i == h->first[1]) return 1;
+  return 0;
+}
+
+/// How deep what has the hands, but for its arms, is in solids of the world where its root is aside by a way, m.
+static cav_status depth_aside(const hands *h, const cav_carry *c, const double way[2], double *q, double *depth) {
+  const cav_model *m = h->m;
+  const int root = m->link[m->body[m->joint[c->root].body].link].root;
+  memcpy(q, h->problem->q_start, (size_t)m->nq * sizeof *q);
+  for (int k = 0; k < 2; k++) q[m->joint[c->root].q + k] += way[k];
+  const cav_status status = cav_position(m, h->state, q);
+  *depth = 0;
+  for (int i = 0; i < h->state->ncontact && !status; i++) {
+    const cav_contact *contact = &h->state->contact[i];
+    const int link = contact->link1 ? contact->link1 : contact->link2;
+    if (m->link[link].root != root || !cav_is_with_solid(m, contact) || is_arm(h, link)) continue;
+    *depth = fmax(*depth, -contact->dist);
+  }
+  return status;
+}
+
+/// Shortens a way of the root on from another one until it leads no deeper into a solid than the start is: a table's edge, say.
+static cav_status stop_at_solids(const hands *h, const cav_carry *c, const double from[2], double way[2]) {
+  enum { PARTS = 8 };
+  double *q = calloc((size_t)h->m->nq, sizeof *q), depth = 0, before = 0, aside[2] = {0, 0};
+  cav_status status = q ? depth_aside(h, c, aside, q, &before) : CAV_NO_MEMORY;
+  int part = PARTS;
+  for (; part > 0 && !status; part--) {
+    for (int k = 0; k < 2; k++) aside[k] = from[k] + way[k] * part / PARTS;
+    status = depth_aside(h, c, aside, q, &depth);
+    if (depth <= before + shallow) break;
+  }
+  for (int k = 0; k < 2; k++) way[k] *= (double)part / PARTS;
+  if (!status) status = cav_position(h->m, h->state, h->problem->q_start);
+  free(q);
+  return status;
+}
+
+static cav_status find_carry(hands *h, double away, cav_carry *c) {
   const cav_model *m = h->m;
   double place[2][3], middle[3];
   cav_pose body;
@@ -247,14 +308,73 @@ static void find_carry(hands *h, double away, cav_carry *c) {
     find_back(h, away, place);
   add3(middle, place[0], place[1]);
   scale3(middle, 0.5, middle);
+  static const double still[2] = {0, 0};
   double at[2] = {h->root[0], h->root[1]};
-  const double come = step_to(h, at, middle, c->come);
+  step_to(h, at, middle, c->come);
+  cav_status status = stop_at_solids(h, c, still, c->come);
+  for (int k = 0; k < 2; k++) at[k] = h->root[k] + c->come[k];
   add3(middle, middle, h->thing.way);
   step_to(h, at, middle, c->go);
+  if (!status) status = stop_at_solids(h, c, c->come, c->go);
   const double *goal = h->problem->q_goal + m->joint[c->root].q;
   for (int k = 0; k < 2 && is_root_bound(h->problem, c->root); k++) c->go[k] = goal[k] - h->root[k] - c->come[k];
-  find_times(h->problem, h, come, c);
+  find_times(h->problem, h, hypot(c->come[0], c->come[1]), c);
   lay(h, &body, place, c);
+  return status;
+}
+
+/// How deep what is carried is in solids of the world, aside from where it is at the start, m.
+static cav_status depth_of_thing(const hands *h, const cav_carry *c, const double way[3], double *q, double *depth) {
+  const cav_model *m = h->m;
+  memcpy(q, h->problem->q_start, (size_t)m->nq * sizeof *q);
+  for (int k = 0; k < 3; k++) q[m->joint[c->thing].q + k] += way[k];
+  const cav_status status = cav_position(m, h->state, q);
+  *depth = 0;
+  for (int i = 0; i < h->state->ncontact && !status; i++) {
+    const cav_contact *contact = &h->state->contact[i];
+    if ((contact->link1 ? contact->link1 : contact->link2) != h->thing.link || !cav_is_with_solid(m, contact)) continue;
+    *depth = fmax(*depth, -contact->dist);
+  }
+  return status;
+}
+
+/// How deep it comes into solids on its way, m: straight, or up to a height over the start, along and down.
+static cav_status depth_on_way(const hands *h, const cav_carry *c, const double *over, double *q, double *most) {
+  enum { PARTS = 12 };
+  const double *to = h->thing.way;
+  const double bend[4][3] = {
+      {0, 0, 0}, {0, 0, over ? *over : 0}, {to[0], to[1], over ? *over : 0}, {to[0], to[1], to[2]}};
+  cav_status status = CAV_OK;
+  *most = 0;
+  for (int i = 0; i <= 3 * PARTS && !status; i++) {
+    const int part = i / PARTS < 3 ? i / PARTS : 2;
+    const double along = (double)(i - part * PARTS) / PARTS;
+    double way[3], depth = 0;
+    for (int k = 0; k < 3; k++)
+      way[k] = over ? bend[part][k] + along * (bend[part + 1][k] - bend[part][k]) : to[k] * i / (3 * PARTS);
+    status = depth_of_thing(h, c, way, q, &depth);
+    *most = fmax(*most, depth);
+  }
+  return status;
+}
+
+/// How high over the start what is carried goes along clear of solids, m; 0: it is so on its straight way, or nowhere as high as
+/// is tried.
+static cav_status find_over(const hands *h, cav_carry *c) {
+  double *q = calloc((size_t)h->m->nq, sizeof *q), depth = 0, before = 0, over = fmax(h->thing.way[2], 0);
+  static const double still[3] = {0, 0, 0};
+  const double most = over + highest;
+  cav_status status = q ? depth_of_thing(h, c, still, q, &before) : CAV_NO_MEMORY;
+  if (!status) status = depth_on_way(h, c, NULL, q, &depth);
+  const int blocked = depth > before + sunk;
+  for (; blocked && !status && over < most; over += higher) {
+    status = depth_on_way(h, c, &over, q, &depth);
+    if (depth <= before + sunk) break;
+  }
+  c->over = blocked && depth <= before + sunk ? fmax(over, higher) : 0;
+  if (!status) status = cav_position(h->m, h->state, h->problem->q_start);
+  free(q);
+  return status;
 }
 
 cav_status cav_carry_find(const cav_problem *problem, double away, cav_carry *carry) {
@@ -275,21 +395,32 @@ cav_status cav_carry_find(const cav_problem *problem, double away, cav_carry *ca
     carry->root = free_joint(m, m->body[roles.body[CAV_ROLE_RIGHT_HAND]].link);
     const int alone = m->link[h.thing.link].root == h.thing.link;
     const int usable = carry->thing >= 0 && carry->root >= 0 && alone && is_still(problem, carry->thing);
-    if (usable && find_hands(&h, &roles, carry->root) && (carry->lifts || !is_pulled(&h))) find_carry(&h, away, carry);
+    if (usable && !carry->hung) status = find_over(&h, carry);
+    carry->lifts |= carry->over > 0;
+    if (usable && !status && find_hands(&h, &roles, carry->root) && (carry->lifts || !is_pulled(&h)))
+      status = find_carry(&h, away, carry);
   }
   cav_state_free(state);
   return status;
 }
 
-void cav_carry_poses(const cav_problem *problem, const cav_carry *carry, double *q, cav_guess_pose pose[2]) {
+int cav_carry_poses(const cav_problem *problem, const cav_carry *carry, double *q,
+                    cav_guess_pose pose[CAV_CARRY_POSES]) {
   const cav_model *m = problem->model;
   const int root = m->joint[carry->root].q, thing = m->joint[carry->thing].q;
-  for (int i = 0; i < 2; i++) {
-    double *at = q + (size_t)i * (size_t)m->nq;
+  const double aside = raised * (carry->to - carry->from);
+  int n = 0;
+  for (int i = 0; i < CAV_CARRY_POSES; i++) {
+    // up, along and down where a solid is in the way
+    const int there = i >= CAV_CARRY_POSES / 2, up = i == 1 || i == 2;
+    if (up && !(carry->over > 0)) continue;
+    double *at = q + (size_t)n * (size_t)m->nq;
     memcpy(at, problem->q_start, (size_t)m->nq * sizeof *at);
-    for (int k = 0; k < 2; k++) at[root + k] += carry->come[k] + (i ? carry->go[k] : 0);
-    if (i && carry->hung) at[thing] = carry->angle;
-    if (i && !carry->hung) copy3(at + thing, carry->there);
-    pose[i] = (cav_guess_pose){i ? carry->to : carry->from, at};
+    for (int k = 0; k < 2; k++) at[root + k] += carry->come[k] + (there ? carry->go[k] : 0);
+    if (there && carry->hung) at[thing] = carry->angle;
+    if (there && !carry->hung) copy3(at + thing, carry->there);
+    if (up) at[thing + 2] = problem->q_start[thing + 2] + carry->over;
+    pose[n++] = (cav_guess_pose){there ? carry->to - up * aside : carry->from + up * aside, at};
   }
+  return n;
 }

@@ -348,8 +348,9 @@ static cav_status add_pushed(const cav_problem *problem, cav_strategy *strategy,
           : "with a hand brought first to the side that what has to move is pushed from, contacts sharp from there on";
   // a door swings by little: what pushes it is often found by the stated guess
   const int hung = carry.hung || hand.hung;
-  g->led = (carry.found || (hangs(problem->model) && !hand.touches)) && !hung && !g->decorated && !g->collides &&
-           !g->sinks && problem->guess == CAV_GUESS_INTERPOLATE && !cav_upright_held(problem);
+  g->led = (carry.found || (hangs(problem->model) && !hand.touches)) && !hung && !g->decorated &&
+           (!g->collides || carry.over > 0) && !g->sinks && problem->guess == CAV_GUESS_INTERPOLATE &&
+           !cav_upright_held(problem);
   if (g->led)
     begin_with(strategy, &push);
   else
@@ -563,7 +564,7 @@ static const double leads_to = 0.05;
 typedef struct leading {
   cav_hand hand;
   cav_carry carry;
-  cav_guess_pose pose[2];
+  cav_guess_pose pose[CAV_CARRY_POSES];
   cav_strategy gait;
   cav_term *term;
   double *q;
@@ -581,16 +582,16 @@ static cav_status lead_both(const cav_problem *problem, double away, leading *l,
   cav_status status = cav_carry_find(problem, away, &l->carry);
   if (status) return status;
   add_terms(problem, l->carry.term, l->carry.found, l, led);
-  if (!l->carry.lifts) led->schedule.kinematics = 1;
+  if (!l->carry.lifts || l->carry.over > 0) led->schedule.kinematics = 1;
   led->schedule.optimality = leads_to;
   if (is_decorated(problem) || !l->carry.found) return CAV_OK;
-  cav_carry_poses(problem, &l->carry, l->q, l->pose);
+  const int poses = cav_carry_poses(problem, &l->carry, l->q, l->pose);
   cav_problem moved = *problem;
   int turns;
-  moved.q_goal = l->q + problem->model->nq;
+  moved.q_goal = l->q + (size_t)(poses - 1) * (size_t)problem->model->nq;
   status = cav_gait_find(&moved, &l->gait, &turns);
   led->guess = CAV_GUESS_INTERPOLATE;
-  led->guess_pose = l->pose, led->nguess_pose = 2;
+  led->guess_pose = l->pose, led->nguess_pose = poses;
   if (!turns) led->swing = l->gait.swing, led->nswing = l->gait.nswing;
   return status;
 }
@@ -609,7 +610,7 @@ static cav_status lead(const cav_problem *problem, int hands, double away, const
   cav_problem led = *problem;
   cav_solve_options first = *options;
   leading l = {.term = calloc((size_t)problem->nterm + CAV_CARRY_TERMS, sizeof *l.term)};
-  l.q = malloc(2 * (size_t)problem->model->nq * sizeof *l.q);
+  l.q = malloc(CAV_CARRY_POSES * (size_t)problem->model->nq * sizeof *l.q);
   cav_status status = !l.term || !l.q ? CAV_NO_MEMORY
                       : hands == 2    ? lead_both(problem, away, &l, &led)
                                       : lead_one(problem, away, &l, &led);

@@ -249,8 +249,8 @@ int cav_verification_looks_at(const cav_verification *verification, const cav_te
   if (pair->external == self) return 0;
   if (term->quantity == CAV_QUANTITY_CLEARANCE && !(cav_pair_clears(model, pair) && holds_still(verification->problem)))
     return 0;
-  if (term->quantity == CAV_QUANTITY_EDGE_FORCE && !(cav_edge_nearness(model, verification->edges, contact, NULL) > 0))
-    return 0;
+  // by its pair alone: rows are read again where what touches has moved
+  if (term->quantity == CAV_QUANTITY_EDGE_FORCE && !cav_edges_of_pair(model, verification->edges, pair)) return 0;
   int link = model->body[term->body].link;
   // a body that is fixed shares its link with all of the world
   if (term->body > 0 && link == 0)

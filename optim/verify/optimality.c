@@ -137,9 +137,10 @@ static cav_status add_knot(model *s, int t, int nbinding, const cav_binding *bin
       add_bounded(s, t, row, x, J);
     }
   }
+  // what is not a number is no reason to leave the columns that are unknowns: it is found in the factor
   for (int i = 0; i < k->width; i++)
-    for (int j = 0; j <= i; j++)
-      if (s->local[i * k->width + j] != 0)
+    for (int j = 0; j <= i && cav_knot_jacobian_unknown(k, t, i) >= 0; j++)
+      if (s->local[i * k->width + j] != 0 && cav_knot_jacobian_unknown(k, t, j) >= 0)
         cav_envelope_add(s->hessian, cav_knot_jacobian_unknown(k, t, i), cav_knot_jacobian_unknown(k, t, j),
                          s->local[i * k->width + j]);
   return status;

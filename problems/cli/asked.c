@@ -15,6 +15,7 @@
 #include "problem_file.h"
 #include "quantity.h"
 #include "rotation.h"
+#include "thing.h"
 
 enum { CELL = 80, NAME = 112 };
 
@@ -234,7 +235,7 @@ cav_status cav_command_print_asked(const cav_problem *p, cav_error *error) {
   } else {
     go_through(&c, width, 0);
     if (width[0] > before) {
-      width[0] = (int)fmax(width[0], 20);
+      width[0] = (int)fmax(width[0], 22); // so wide is the heading
       printf("%-*s  %*s  %*s  %*s\n", width[0] + 2, "what start and goal have", width[1], "start", width[2], "goal",
              width[3], "wanted");
       if (go_through(&c, width, 1))
@@ -325,6 +326,50 @@ static int tell_things(FILE *out, const cav_problem *p, const cav_term *term) {
   return 1;
 }
 
+/// Whether all that a link can touch with rolls: balls, and what stands on a round side.
+static int is_round(const cav_model *m, int link) {
+  int n = 0;
+  for (int g = 0; g < m->ngeom; g++) {
+    const cav_geom *geom = &m->geom[g];
+    if (geom->link != link || (!geom->contype && !geom->conaffinity)) continue;
+    if (geom->type != CAV_GEOM_SPHERE && geom->type != CAV_GEOM_CAPSULE && geom->type != CAV_GEOM_ELLIPSOID) return 0;
+    n++;
+  }
+  return n > 0;
+}
+
+/// Of a free thing that no actuator moves and that is asked for along the ground: that it may slide or roll has to be said.
+static int tell_moved(FILE *out, const cav_problem *p) {
+  const cav_model *m = p->model;
+  cav_state *state = cav_state_new(m);
+  cav_thing thing;
+  const cav_status status = state ? cav_thing_find(p, 1, state, &thing) : CAV_NO_MEMORY;
+  cav_state_free(state);
+  if (status || thing.link == 0 || thing.joint >= 0 || thing.rise >= CAV_THING_WAY) return 0;
+  const char *name = m->body[m->link[thing.link].body].name;
+  const double far = hypot(thing.way[0], thing.way[1]);
+  if (is_round(m, thing.link)) {
+    if (!p->close_at_rest || p->cycle.on) return 0;
+    fprintf(out,
+            "note: '%.60s' is asked for %.2g m on, and all is at rest after the last knot: <horizon close=\"open\"/> "
+            "where it "
+            "may still roll then\n",
+            name, far);
+    return 1;
+  }
+  for (int i = 0; i < p->nterm; i++) {
+    const cav_term *term = &p->term[i];
+    const int whole = term->quantity == CAV_QUANTITY_SLIP && term->within > 0;
+    if (whole && (!term->body || m->body[term->body].link == thing.link)) return 0;
+  }
+  fprintf(
+      out,
+      "note: '%.60s' is asked for %.2g m on: <slip body=\"%.60s\" weight=\"0\" within=\"any\"/> where it is to slide "
+      "there; without it what touches it has to hold still, as when it is carried\n",
+      name, far, name);
+  return 1;
+}
+
 /// Of a posture that puts a free body farther than motions go.
 static int tell_far_root(FILE *out, const cav_problem *p, const double *q, const char *which) {
   for (int j = 0; j < p->model->njoint; j++) {
@@ -349,5 +394,5 @@ int cav_command_tell_units(FILE *out, const cav_problem *p) {
     n += tell_degrees(out, p, term) + tell_millimetres(out, p, term) + tell_touch(out, p, term) +
          tell_things(out, p, term);
   }
-  return n;
+  return n + tell_moved(out, p);
 }

@@ -301,7 +301,8 @@ cav_status cav_command_print_problem(const cav_problem *p, int all, cav_error *e
          p->free_start ? ", with posture and velocity at the start" : "",
          p->guess == CAV_GUESS_HOLD   ? "holds the start"
          : p->guess == CAV_GUESS_PUMP ? "is simulated, pumping energy"
-                                      : "goes from start to goal");
+         : cav_problem_has_goal(p)    ? "goes from start to goal"
+                                      : "stays at the start, as there is no goal");
   if (p->nguess_pose > 0) printf(" by %d postures", p->nguess_pose);
   if (p->guess_height > 0) printf(", with an arc of %g m from %g to %g s", p->guess_height, p->guess_from, p->guess_to);
   if (p->guess_bow[0] != 0 || p->guess_bow[1] != 0)

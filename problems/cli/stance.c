@@ -89,15 +89,17 @@ static void print_touch(const cav_model *m, const cav_state *state) {
   if (!print_pairs(m, state) && !bodies) printf(", touches nothing of the world");
 }
 
-// the centre of mass of what actuators move, things of the scene aside; of all where they move nothing. The state is at a posture
-static void find_centre(const cav_model *m, const cav_state *state, double com[3]) {
-  int driven = 0;
+// the centre of mass of what actuators move, things of the scene aside; of all where they move nothing. Whether things were left
+// aside. The state is at a posture
+static int find_centre(const cav_model *m, const cav_state *state, double com[3]) {
+  int driven = 0, aside = 0;
   double mass = 0;
   for (int k = 0; k < 3; k++) com[k] = 0;
   for (int l = 1; l < m->nlink; l++) driven |= m->link[l].driven;
   for (int l = 1; l < m->nlink; l++) {
     const cav_link *link = &m->link[l];
     const cav_pose *pose = &state->link[l];
+    aside |= driven && !link->driven;
     if (driven && !link->driven) continue;
     mass += link->mass;
     for (int k = 0; k < 3; k++)
@@ -105,6 +107,7 @@ static void find_centre(const cav_model *m, const cav_state *state, double com[3
                               pose->rotation[3 * k + 1] * link->com[1] + pose->rotation[3 * k + 2] * link->com[2]);
   }
   for (int k = 0; k < 3 && mass > 0; k++) com[k] /= mass;
+  return aside;
 }
 
 cav_status cav_command_print_stance(const cav_problem *p, const char *name, const double *q, cav_error *error) {
@@ -121,8 +124,9 @@ cav_status cav_command_print_stance(const cav_problem *p, const char *name, cons
              cav_status_name(status));
     return status;
   }
-  find_centre(p->model, state, com);
-  printf("  %-6s centre of mass at %.3f %.3f %.3f m", name, com[0], com[1], com[2]);
+  const int some = find_centre(p->model, state, com);
+  printf("  %-6s centre of mass%s at %.3f %.3f %.3f m", name, some ? " of what actuators move" : "", com[0], com[1],
+         com[2]);
   print_touch(p->model, state);
   const cav_contact *deepest = cav_command_deepest(state);
   if (deepest && -deepest->dist > deep) {

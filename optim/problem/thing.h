@@ -1,4 +1,4 @@
-/// What no actuator moves and is asked for elsewhere, and what it takes to bring a hand to it. Private to optim/solver.
+/// What no actuator moves and is asked for elsewhere, and what it takes to bring a hand to it. Private to optim/ and the tool.
 #ifndef CAVORT_THING_H
 #define CAVORT_THING_H
 
