@@ -338,6 +338,8 @@ static cav_status add_pushed(const cav_problem *problem, cav_strategy *strategy,
   if (!status && !carry.found) status = cav_hand_find(problem, 1, &hand);
   if (status || (!carry.found && !hand.found)) return status;
   push.hand = carry.found ? 2 : 1;
+  // what goes over solids is led clear of them, and arms that hang are no reason to lift who carries it
+  if (carry.found && carry.over > 0) push.schedule.solids = problem->schedule.solids;
   push.text =
       carry.found
           ? carry.lifts

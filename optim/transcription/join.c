@@ -1,6 +1,7 @@
 /// Joins the dense rows of a knot into its Hessian, H += R'R (cav_dense_square). Trees that no row joins make blocks of
 /// their own: which is read off the zeros of the rows, so bodies that touch nothing cost their own small products. One
 /// group gives the product of all.
+#include <assert.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -22,23 +23,36 @@ static int representative(const join *g, int tree) {
   return tree;
 }
 
-/// Joins the trees of every row.
+/// Whether a row has an entry in the dofs of a tree, first to end.
+static int has_entry(const join *g, const double *row, int first, int end) {
+  for (int block = 0; block < 3; block++, row += g->nv)
+    for (int d = first; d < end; d++)
+      if (row[d] != 0) return 1;
+  return 0;
+}
+
+/// Joins the trees of every row, whose dofs stand one after the other; of rows after the one that leaves a single group there is
+/// nothing to know.
 static void find_groups(join *g, const cav_model *m, int n, const double *row) {
+  g->ngroup = 0;
   for (int d = 0; d < g->nv; d++) {
     g->tree[d] = m->dof[d].parent < 0 ? d : g->tree[m->dof[d].parent];
+    assert(d == 0 || g->tree[d] >= g->tree[d - 1]);
     g->owner[d] = d;
+    g->ngroup += g->tree[d] == d;
   }
-  for (int i = 0; i < n; i++, row += 3 * (size_t)g->nv) {
-    g->group[i] = -1;
-    for (int k = 0, d = 0; k < 3 * g->nv; k++, d = d + 1 < g->nv ? d + 1 : 0) {
-      if (row[k] == 0) continue;
-      int tree = representative(g, g->tree[d]), other = g->group[i];
-      if (other < 0 || tree < other) g->group[i] = tree;
-      if (other >= 0) g->owner[tree < other ? other : tree] = tree < other ? tree : other;
+  for (int i = 0; i < n && g->ngroup > 1; i++, row += 3 * (size_t)g->nv) {
+    int *group = &g->group[i];
+    *group = -1;
+    for (int first = 0, end; first < g->nv; first = end) {
+      for (end = first + 1; end < g->nv && g->tree[end] == first;) end++;
+      if (!has_entry(g, row, first, end)) continue;
+      const int tree = representative(g, first), other = *group < 0 ? tree : representative(g, *group);
+      *group = tree < other ? tree : other;
+      g->owner[tree < other ? other : tree] = *group;
+      g->ngroup -= tree != other;
     }
   }
-  g->ngroup = 0;
-  for (int d = 0; d < g->nv; d++) g->ngroup += g->tree[d] == d && g->owner[d] == d;
 }
 
 /// Columns of the group that starts with a tree; returns their number.
