@@ -279,6 +279,8 @@ posture <<'TEXT'
 <start key="supine" height="floor"/>
 TEXT
 inspected 0 p.xml
+check "with --all each is named" grep -qE "touches the world with (\w+, ){8,}\w+ in x" out
+run 0 inspect p.xml
 check "many are counted" grep -qE "touches the world with (\w+, ){7}\w+ and [0-9]+ more in x" out
 # a hand in the other hand, where a start is found: a note, and no word of a solid to be moved
 posture <<'TEXT'

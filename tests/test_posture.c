@@ -85,6 +85,18 @@ static void look(const cav_model *m, cav_state *state, const cav_roles *roles, c
   memcpy(s->com, com, sizeof s->com);
 }
 
+// whether a joint of a leg, the knee, is well above the hip
+static int is_raised(const cav_model *m, const cav_state *state, const cav_roles *roles, int role) {
+  cav_pose hip, at;
+  double highest = -INFINITY;
+  cav_object_pose(m, state, CAV_OBJECT_XBODY, roles->limb[role], &hip);
+  for (int i = roles->body[role]; i > 0 && i != roles->limb[role]; i = m->body[i].parent) {
+    cav_object_pose(m, state, CAV_OBJECT_XBODY, i, &at);
+    highest = fmax(highest, at.pos[2]);
+  }
+  return highest > hip.pos[2] + 0.1;
+}
+
 // what the word says
 static void check_meaning(const cav_model *m, cav_state *state, const cav_roles *roles, const char *name,
                           const double *q) {
@@ -103,12 +115,14 @@ static void check_meaning(const cav_model *m, cav_state *state, const cav_roles 
     if (!joint->limited || (joint->type != CAV_JOINT_HINGE && joint->type != CAV_JOINT_SLIDE)) continue;
     CHECK(q[joint->q] >= joint->range[0] && q[joint->q] <= joint->range[1]);
   }
-  int lying = !strncmp(name, "lie-", 4), over = 1;
+  const int hook = !strcmp(name, "hook-lying"), lying = hook || !strncmp(name, "lie-", 4);
+  int over = 1;
   if (!strcmp(name, "lie")) {
     CHECK(s.up > 0.99 && s.torso < 5e-3);
   } else if (lying || !strcmp(name, "all-fours")) {
     CHECK(fabs(s.up) < 0.4);
-    if (!strcmp(name, "lie-back")) CHECK(s.front > 0.9);
+    if (hook || !strcmp(name, "lie-back")) CHECK(s.front > 0.9);
+    for (int k = 0; hook && k < 2; k++) CHECK(foot[k] < 5e-3 && is_raised(m, state, roles, feet[k]));
     if (!strcmp(name, "lie-front")) CHECK(s.front < -0.9);
     if (!strcmp(name, "lie-side")) CHECK(s.left > 0.9);
     if (!lying) CHECK(s.front < -0.9 && knee[0] < 5e-3 && knee[1] < 5e-3 && hand[0] < 5e-3 && hand[1] < 5e-3);

@@ -423,8 +423,8 @@ CAV_API cav_status cav_sensor_of(const cav_model *model, cav_sensor_type type, c
 CAV_API cav_status cav_configuration_stand(const cav_model *model, cav_state *state, double *q, cav_error *error);
 
 /// What key="kneel" and the like are in files: q [nq] of a posture that is found, by name: squat, kneel, half-kneel, sit,
-/// sit-floor, all-fours, lie-back, lie-front or lie-side of a biped, lie of a quadruped, stand of both. CAV_BAD_INPUT: no such
-/// posture, or the model has none, and why; CAV_NOT_FINITE, CAV_NO_MEMORY. Uses the state.
+/// sit-floor, all-fours, lie-back, hook-lying, lie-front or lie-side of a biped, lie of a quadruped, stand of both.
+/// CAV_BAD_INPUT: no such posture, or the model has none, and why; CAV_NOT_FINITE, CAV_NO_MEMORY. Uses the state.
 CAV_API cav_status cav_configuration_posture(const cav_model *model, cav_state *state, const char *name, double *q,
                                              cav_error *error);
 

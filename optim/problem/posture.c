@@ -98,6 +98,13 @@ static const shape biped[] = {{.name = "squat",
                                .pitch = -90,
                                .limb = {{{0, 0.15, -1}, {0, 0.1, -1}}},
                                .near = TRUNK | FEET | HANDS},
+                              {.name = "hook-lying",
+                               .meaning = "on the back, knees bent, soles on the ground",
+                               .pitch = -90,
+                               .limb = {{{0.7, 0.15, -0.6}, {-0.9, 0, -0.3}}, {{0}}, {{0, 0.8, -1}, {0, 0.8, -1}}},
+                               .on = FEET,
+                               .near = TRUNK | HANDS,
+                               .flat = FEET},
                               {.name = "lie-front",
                                .meaning = "on the belly, face down",
                                .pitch = 90,
@@ -118,8 +125,8 @@ static const shape quadruped = {
 
 enum { BIPED_SHAPES = sizeof biped / sizeof *biped };
 
-const char *const cav_posture_names[] = {"squat",    "kneel",     "half-kneel", "sit", "sit-floor", "all-fours",
-                                         "lie-back", "lie-front", "lie-side",   "lie", NULL};
+const char *const cav_posture_names[] = {"squat",    "kneel",      "half-kneel", "sit",      "sit-floor", "all-fours",
+                                         "lie-back", "hook-lying", "lie-front",  "lie-side", "lie",       NULL};
 
 /// A search for one.
 typedef struct poser {

@@ -33,6 +33,9 @@ static const double pace = 0.8, least_step = 0.05, shallow = 1e-3;
 /// for which it is.
 static const double sunk = 0.01, higher = 0.02, highest = 0.6, raised = 0.3;
 
+/// Part of the weight of what leads hands that keeps the root at its height.
+static const double lightly = 0.3;
+
 /// What is known of the hands while places are found.
 typedef struct hands {
   const cav_model *m;
@@ -235,6 +238,12 @@ static void lay(const hands *h, const cav_pose *body, double place[2][3], cav_ca
   add3(c->there, pose.pos, h->thing.way);
   if (!hung) push_term(c, CAV_SENSOR_FRAMEZAXIS, kind, index, c->upright)->to = h->thing.time;
   push_term(c, CAV_SENSOR_FRAMEPOS, kind, index, c->still)->to = c->from;
+  // hands that go up would take the root along, where nothing weighs yet
+  c->height[2] = h->root[2];
+  if (c->over > 0) {
+    cav_term *level = push_term(c, CAV_SENSOR_FRAMEPOS, CAV_OBJECT_XBODY, m->joint[c->root].body, c->height);
+    level->component = 2, level->weight *= lightly, level->to = h->thing.time;
+  }
   if (c->to < h->thing.time) {
     cav_term *there = push_term(c, CAV_SENSOR_FRAMEPOS, kind, index, c->there);
     there->from = c->to, there->to = h->thing.time;

@@ -4,7 +4,7 @@
 
 #include "cavort/solve.h"
 
-enum { CAV_CARRY_TERMS = 5, CAV_CARRY_POSES = 4 };
+enum { CAV_CARRY_TERMS = 6, CAV_CARRY_POSES = 4 };
 
 /// Terms that bring the hands to two places of a body that is free or hangs on one joint, keep a free one from tumbling, where it
 /// is until then and where it is asked for once they leave it; and how the body that has the hands comes and goes along.
@@ -16,6 +16,7 @@ typedef struct cav_carry {
   cav_term term[CAV_CARRY_TERMS]; ///< they borrow what follows
   double place[2][3];             ///< m, of the right and the left hand in the frame of the body
   double upright[3];              ///< z axis of the body at the start
+  double height[3];               ///< m, third: of the root at the start
   double still[3], there[3];      ///< m, where it is at the start and where it is asked for last
   int root, thing;                ///< free joint of what has the hands, and the joint of what they move
   int hung;                       ///< 1: that joint is a hinge or a slide

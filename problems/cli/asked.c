@@ -152,7 +152,7 @@ static int write_posture(const comparison *c, const cav_term *term, char name[NA
   const int place = at - joint->dof, free = joint->type == CAV_JOINT_FREE, ball = joint->type == CAV_JOINT_BALL;
   const size_t used = strlen(name);
   if (term->dofs != CAV_DOFS_ONE || free || ball)
-    snprintf(name + used, NAME - used, ", farthest %.40s%s", *joint->name ? joint->name : "joint",
+    snprintf(name + used, NAME - used, ", farthest %.40s%s", *joint->name ? joint->name : m->body[joint->body].name,
              free   ? axis[place]
              : ball ? axis[3 + place]
                     : "");

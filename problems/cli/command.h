@@ -200,8 +200,9 @@ cav_status cav_command_print_problem(const cav_problem *problem, int all, cav_er
 int cav_command_tell_equalities(FILE *out, const cav_problem *problem);
 
 /// Prints where a posture of a problem has its centre of mass, which bodies touch the world and what is deepest in what: a line
-/// that begins with a name. stance.c.
-cav_status cav_command_print_stance(const cav_problem *problem, const char *name, const double *q, cav_error *error);
+/// that begins with a name. all: every body that touches is named. stance.c.
+cav_status cav_command_print_stance(const cav_problem *problem, const char *name, const double *q, int all,
+                                    cav_error *error);
 
 /// The names of the geoms of a pair, of the one that moves and of the one that it is in: where one is of the world, that. Returns
 /// the latter. stance.c.

@@ -286,9 +286,9 @@ cav_status cav_command_print_problem(const cav_problem *p, int all, cav_error *e
            : p->cycle.mirror == CAV_MIRROR_Y ? ", mirrored along y"
                                              : "");
   cav_command_tell_asymmetry(p, stdout);
-  cav_status status = cav_command_print_stance(p, "start", p->q_start, error);
+  cav_status status = cav_command_print_stance(p, "start", p->q_start, all, error);
   if (!status && !p->cycle.on) print_start_speeds(p);
-  if (!status && cav_problem_has_goal(p)) status = cav_command_print_stance(p, "goal", p->q_goal, error);
+  if (!status && cav_problem_has_goal(p)) status = cav_command_print_stance(p, "goal", p->q_goal, all, error);
   if (status) return status;
   if (!cav_problem_has_goal(p)) printf("  goal   no <goal>: the goal posture is the start\n");
   if (*cav_problem_lowered(p))

@@ -117,7 +117,9 @@ static void list_joints(FILE *out, const cav_scaffold *s) {
     if (joint->type == CAV_JOINT_HINGE || joint->type == CAV_JOINT_SLIDE) {
       double unit = turns ? degrees : 1;
       if (joint->limited) fprintf(out, " %.4g to %.4g,", unit * joint->range[0], unit * joint->range[1]);
-      fprintf(out, " at %.4g %s; + ", unit * s->q[joint->q], turns ? "degrees" : "m");
+      // what a search left of nothing is nothing
+      const double at = fabs(s->q[joint->q]) < 1e-4 ? 0 : s->q[joint->q];
+      fprintf(out, " at %.4g %s; + ", unit * at, turns ? "degrees" : "m");
       put_name(out, s->sense[j]);
     }
     fputc('\n', out);

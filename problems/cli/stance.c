@@ -1,6 +1,7 @@
 /// How a posture touches and is in things, in one line of inspect: its centre of mass, which bodies touch the world and where,
 /// which touch bodies of other trees, and which geom is deepest in what. And the two geoms of a contact by their names, what
 /// stands behind what moves.
+#include <limits.h>
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -48,21 +49,21 @@ static int bodies_of(const cav_model *m, const cav_contact *c, int body[2]) {
 }
 
 // ", beam touches ball" of bodies of different trees; returns how many pairs there are
-static int print_pairs(const cav_model *m, const cav_state *state) {
+static int print_pairs(const cav_model *m, const cav_state *state, int named) {
   int pairs = 0;
   for (int i = 0; i < state->ncontact; i++) {
     int body[2], other[2], before = 0;
     if (!bodies_of(m, &state->contact[i], body)) continue;
     for (int k = 0; k < i; k++) before |= bodies_of(m, &state->contact[k], other) && !memcmp(body, other, sizeof body);
-    if (!before && ++pairs <= NAMED) printf(", %.60s touches %.60s", name_of(m, body[0]), name_of(m, body[1]));
+    if (!before && ++pairs <= named) printf(", %.60s touches %.60s", name_of(m, body[0]), name_of(m, body[1]));
   }
-  if (pairs > NAMED) printf(" and %d more", pairs - NAMED);
+  if (pairs > named) printf(" and %d more", pairs - named);
   return pairs;
 }
 
 // ", touches the world with a, b in x 0..1, y 0..1"; where is that of what actuators move, things of the scene aside. And what
 // touches what else
-static void print_touch(const cav_model *m, const cav_state *state) {
+static void print_touch(const cav_model *m, const cav_state *state, int named) {
   double low[2] = {INFINITY, INFINITY}, high[2] = {-INFINITY, -INFINITY};
   int bodies = 0, driven = 0, things = 0;
   for (int i = 0; i < state->ncontact; i++) {
@@ -79,14 +80,14 @@ static void print_touch(const cav_model *m, const cav_state *state) {
       high[k] = fmax(high[k], state->contact[i].pos[k]);
     }
     for (int k = 0; k < i; k++) before |= body_of(m, &state->contact[k]) == body;
-    if (before || ++bodies > NAMED) continue;
+    if (before || ++bodies > named) continue;
     printf("%s%.60s", bodies == 1 ? ", touches the world with " : ", ", name_of(m, body));
   }
-  if (bodies > NAMED) printf(" and %d more", bodies - NAMED);
+  if (bodies > named) printf(" and %d more", bodies - named);
   if (bodies)
     printf("%s in x %.3f..%.3f, y %.3f..%.3f", driven && things ? "; that of what actuators move" : "", low[0], high[0],
            low[1], high[1]);
-  if (!print_pairs(m, state) && !bodies) printf(", touches nothing of the world");
+  if (!print_pairs(m, state, named) && !bodies) printf(", touches nothing of the world");
 }
 
 // the centre of mass of what actuators move, things of the scene aside; of all where they move nothing. Whether things were left
@@ -110,7 +111,8 @@ static int find_centre(const cav_model *m, const cav_state *state, double com[3]
   return aside;
 }
 
-cav_status cav_command_print_stance(const cav_problem *p, const char *name, const double *q, cav_error *error) {
+cav_status cav_command_print_stance(const cav_problem *p, const char *name, const double *q, int all,
+                                    cav_error *error) {
   cav_state *state = cav_state_new(p->model);
   double com[3];
   cav_status status = state ? CAV_OK : CAV_NO_MEMORY;
@@ -127,7 +129,7 @@ cav_status cav_command_print_stance(const cav_problem *p, const char *name, cons
   const int some = find_centre(p->model, state, com);
   printf("  %-6s centre of mass%s at %.3f %.3f %.3f m", name, some ? " of what actuators move" : "", com[0], com[1],
          com[2]);
-  print_touch(p->model, state);
+  print_touch(p->model, state, all ? INT_MAX : NAMED);
   const cav_contact *deepest = cav_command_deepest(state);
   if (deepest && -deepest->dist > deep) {
     char moves[CAV_WORDS], stands[CAV_WORDS];

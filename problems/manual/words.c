@@ -54,6 +54,11 @@ static const struct {
      "key=\"stand\" of <start>, <goal>, <pose> and <waypoint> is a posture on the feet, found for any model that has "
      "feet;\n  others are found for any humanoid. height=\"floor\" beside it puts it on the floor",
      "postures"},
+    {"bridge|crook|supine|prone",
+     "of <start>, <goal>, <pose> and <waypoint> key=\"lie-back\" lies face up, key=\"hook-lying\" too, with knees bent "
+     "and "
+     "soles\n  down, key=\"lie-front\" face down",
+     "postures"},
     {"keyframe|keyframes|qpos0", "a posture that the model's file names: key=\"NAME\" of <start>, <goal> and others",
      "key"},
     {"feet|hands|paw|paws|knee|elbow|hip|shoulder|ankle|wrist|leg|legs|arm|arms|thigh|shin|toe|finger|neck|waist|back|"
