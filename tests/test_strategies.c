@@ -52,8 +52,8 @@ static void test_through_ground(void) {
   CHECK(cav_strategy_list(p, strategy, &n) == CAV_OK);
   CHECK(p->guess == CAV_GUESS_INTERPOLATE && strategy[0].guess == CAV_GUESS_HOLD && !strategy[0].stated);
   CHECK(offers(p,
-               "stated near-1 near-2 near-3 near-4 fine near-5 near-6 soft line slow momentum near-7 near-8 "
-               "near-9 near-10 repair-1 repair-2 repair-3 repair-4 open longer stronger"));
+               "stated near-1 near-2 near-3 near-4 calm near-5 near-6 fine near-7 near-8 soft line slow momentum "
+               "near-9 near-10 near-11 near-12 repair-1 repair-2 repair-3 repair-4 open longer stronger"));
   p->guess_height = 0.3, p->guess_from = 1, p->guess_to = 2;
   CHECK(cav_strategy_list(p, strategy, &n) == CAV_OK && strategy[0].stated);
   cav_problem_free(p);
@@ -463,10 +463,9 @@ static void test_cycle(void) {
   cav_problem *p = cav_problem_load(CAVORT_SOURCE_ROOT "/problems/motions/quadruped-trot/problem.xml", NULL, &error);
   if (!CHECK(p != NULL)) return;
   CHECK(p->cycle.on);
-  CHECK(offers(
-      p,
-      "stated near-1 near-2 near-3 near-4 soft slow momentum near-5 near-6 near-7 near-8 repair-1 repair-2 repair-3 "
-      "repair-4 stronger"));
+  CHECK(offers(p,
+               "stated near-1 near-2 near-3 near-4 calm near-5 near-6 soft slow momentum near-7 near-8 near-9 near-10 "
+               "repair-1 repair-2 repair-3 repair-4 stronger"));
   cav_strategy stated = {.name = "stated", .stated = 1, .order = p->order, .schedule = p->schedule}, mended;
   const cav_verdict slides = {.slip_mean_m_s = 0.0105, .closed_loop_seconds = p->duration};
   int found = 0;
@@ -594,8 +593,49 @@ static void test_lightened(void) {
   }
 }
 
+/// Costs on the turning of the root over the motion weigh 40 times at first, four times just before the last stage and once in
+/// that; one at the end, or on other dofs, always once.
+static void test_calmed(void) {
+  static const char *const terms[] = {"<velocity dofs='root_angular' weight='2'/>",
+                                      "<velocity dofs='root_angular' at='.1' weight='2'/>",
+                                      "<velocity dofs='all' weight='2'/>"};
+  for (int i = 0; i < 3; i++) {
+    char text[1000];
+    snprintf(text, sizeof text,
+             "<problem name='turn' model='" CAVORT_SOURCE_ROOT
+             "/problems/models/humanoid.xml'><horizon duration='.2' timestep='.02'/><start key='stand' height='floor'/>"
+             "<goal key='stand' height='floor'><root euler='0 0 30'/></goal><cost>%s</cost>"
+             "<schedule calm='true'/></problem>",
+             terms[i]);
+    cav_problem *p = strategy_problem(text);
+    cav_error error = {0};
+    cav_trajectory *at = p ? cav_problem_guess(p, &error) : NULL;
+    if (!CHECK(at != NULL && p->schedule.calm)) return;
+    int one = 0;
+    for (int k = 0; k < p->nterm; k++)
+      if (p->term[k].weight == 2) one = k;
+    const int all = p->nterm;
+    p->term += one, p->nterm = 1;
+    cav_transcription *tr = cav_transcription_new(p, 1, &error);
+    static const double way[] = {0, 1 - 1e-12, 1}, times[] = {40, 4, 1};
+    double cost[3] = {0};
+    for (int k = 0; k < 3 && CHECK(tr != NULL); k++) {
+      cav_stage_set(p, way[k], tr);
+      CHECK(cav_transcription_values(tr, at) == CAV_OK);
+      cost[k] = cav_transcription_cost(tr);
+    }
+    CHECK(i == 1 || cost[2] > 0);
+    for (int k = 0; k < 3; k++) CHECK_NEAR(cost[k], (i ? 1 : times[k]) * cost[2], 1e-9 * cost[2]);
+    cav_transcription_free(tr);
+    p->term -= one, p->nterm = all;
+    cav_trajectory_free(at);
+    cav_problem_free(p);
+  }
+}
+
 int main(void) {
   test_lightened();
+  test_calmed();
   test_through_ground();
   test_upright();
   test_cycle();

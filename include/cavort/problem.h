@@ -326,6 +326,7 @@ typedef struct cav_schedule {
   cav_next_slip next_slip;       ///< slip over the step, the same way
   int kinematics;                ///< 1: before the first stage the guess goes to its targets by kinematics alone
   int light_avoided;             ///< 1: costs on forces of bodies of the world grow from three tenths over the stages
+  int calm;                      ///< 1: costs on the turning of roots weigh more before the last stage
   double optimality;             ///< what the last phase may leave to be saved; 0: cav_solve_options.optimality
   cav_stage_options first, last; ///< options of the first and of the last stage
 } cav_schedule;

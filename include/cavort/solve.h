@@ -336,7 +336,7 @@ CAV_API const cav_options *cav_optimiser_contact(const cav_optimiser *optimiser)
 CAV_API const double *cav_optimiser_multipliers(cav_optimiser *optimiser, int *n);
 
 enum {
-  CAV_STRATEGIES = 56,       ///< most strategies of a problem
+  CAV_STRATEGIES = 64,       ///< most strategies of a problem
   CAV_STRATEGY_SWINGS = 16,  ///< most sines of one: two joints of eight limbs, further ones stand
   CAV_STRATEGY_CHANGES = 160 ///< room for what a repair changed, in words
 };

@@ -341,6 +341,7 @@ static const cav_xml_element schedule = {
         REAL("optimality", 0, "", "(8e-4)", "the solve ends where steps gain slowly and one may save no more than this fraction of the cost; 0: the default"),
         WORD("solids", cav_problem_solids, "hard", "how the world begins: grow where the guess runs into solids"),
         FLAG("kinematics", "false", "before the first stage the guess goes to where it meets its targets by inverse kinematics over all knots, whatever forces that takes"),
+        FLAG("calm", "false", "costs on the turning of roots over the motion weigh 40 times as much at first, down to 4 times before the last stage: a way that is found so keeps the trunk still"),
         FLAG("light_avoided", "false", "costs on forces of bodies of the world, which are to be avoided, grow from three tenths over the stages: soft contacts press from afar")),
     CHILDREN(&schedule_first, &schedule_last), 0, "continuation from soft, blurred contacts to hard, sharp ones"};
 #define IPOPT(name, type, least, most, strict, words, text) TEXT(#name, "(Ipopt's own, or what the stages set)", text),

@@ -468,6 +468,7 @@ static cav_status read_schedule(const cav_problem_reader *reader) {
   schedule->solids = (cav_solids)cav_xml_word(node, "solids", schedule->solids);
   schedule->kinematics = cav_xml_bool(node, "kinematics", schedule->kinematics);
   schedule->light_avoided = cav_xml_bool(node, "light_avoided", schedule->light_avoided);
+  schedule->calm = cav_xml_bool(node, "calm", schedule->calm);
   schedule->next_gap = (cav_next_gap)cav_xml_word(node, "next_gap", schedule->next_gap);
   schedule->next_slip = (cav_next_slip)cav_xml_word(node, "next_slip", schedule->next_slip);
   int n;

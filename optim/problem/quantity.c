@@ -173,6 +173,11 @@ int cav_term_avoids(const cav_model *m, const cav_term *term) {
          m->body[term->body].link == 0;
 }
 
+int cav_term_calms(const cav_term *term) {
+  return term->quantity == CAV_QUANTITY_VELOCITY && term->dofs == CAV_DOFS_ROOT_ANGULAR && term->use == CAV_USE_COST &&
+         term->weight > 0 && term->from <= 0 && term->to < 0;
+}
+
 int cav_term_placed(const cav_model *model, const cav_term *term) {
   const cav_sensor *s = &term->sensor;
   const int is = term->quantity == CAV_QUANTITY_SENSOR && s->type == CAV_SENSOR_FRAMEPOS && !s->referred;

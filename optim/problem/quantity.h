@@ -52,6 +52,9 @@ int cav_term_asks(const cav_term *term);
 /// Whether it is a cost on the forces of a body of the world, which says that this is to be avoided.
 int cav_term_avoids(const cav_model *model, const cav_term *term);
 
+/// Whether it is a cost on the turning of free roots over the whole motion.
+int cav_term_calms(const cav_term *term);
+
 /// The link whose place in the world a term is of, 0: the world; -1: it is of no place.
 int cav_term_placed(const cav_model *model, const cav_term *term);
 

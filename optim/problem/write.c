@@ -421,6 +421,7 @@ static void write_tail(FILE *out, const cav_problem *p) {
   write_text(out, "solids", cav_problem_solids[p->schedule.solids]);
   if (p->schedule.kinematics) write_text(out, "kinematics", "true");
   if (p->schedule.light_avoided) write_text(out, "light_avoided", "true");
+  if (p->schedule.calm) write_text(out, "calm", "true");
   if (p->schedule.optimality > 0) write_number(out, "optimality", p->schedule.optimality);
   fputs(">\n", out);
   write_stage(out, "first", &p->schedule.first);

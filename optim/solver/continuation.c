@@ -50,6 +50,9 @@ static const double STOPS_FROM = 0.5;
 // touches
 static const double avoided = 0.3;
 
+// times that costs on the turning of roots weigh at first, and on the way to the last stage, where a trunk is to be kept still
+static const double calm_first = 40, calm_last = 4;
+
 void cav_stage_set(const cav_problem *problem, double x, cav_transcription *tr) {
   cav_stage_law(problem, x, tr->options.timestep, &tr->options);
   tr->options.stops = x >= STOPS_FROM && problem->close_at_rest && !problem->cycle.on;
@@ -58,6 +61,7 @@ void cav_stage_set(const cav_problem *problem, double x, cav_transcription *tr) 
   tr->penalty.range = between(penalised.range, PENALTY_RISE * penalised.range, x);
   tr->penalty.unactuated = cav_schedule_at(&problem->schedule, x).penalty;
   tr->lightened = problem->schedule.light_avoided ? 1 - between(avoided, 1, x) : 0;
+  tr->calmed = problem->schedule.calm && x < 1 ? between(calm_first, calm_last, x) - 1 : 0;
   tr->depth_weight = problem->schedule.solids == CAV_SOLIDS_GROW ? depth_weight : 0;
   // nothing has pushed a body out of the floor before its first knot
   if (problem->free_start && cav_problem_has_record(problem))

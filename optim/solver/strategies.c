@@ -71,10 +71,10 @@ static void add(cav_strategy *strategy, int *n, const cav_strategy *from, const 
 
 // what is nearly there is mended before anything else is tried
 static void add_near(cav_strategy *strategy, int *n, const cav_strategy *stated, int times) {
-  static const char *const name[] = {"near-1",  "near-2",  "near-3",  "near-4",  "near-5",  "near-6",
-                                     "near-7",  "near-8",  "near-9",  "near-10", "near-11", "near-12",
-                                     "near-13", "near-14", "near-15", "near-16", "near-17", "near-18",
-                                     "near-19", "near-20", "near-21", "near-22", "near-23", "near-24"};
+  static const char *const name[] = {
+      "near-1",  "near-2",  "near-3",  "near-4",  "near-5",  "near-6",  "near-7",  "near-8",  "near-9",  "near-10",
+      "near-11", "near-12", "near-13", "near-14", "near-15", "near-16", "near-17", "near-18", "near-19", "near-20",
+      "near-21", "near-22", "near-23", "near-24", "near-25", "near-26", "near-27", "near-28", "near-29", "near-30"};
   cav_strategy repaired = *stated;
   repaired.use = CAV_STRATEGY_NEAR;
   size_t before = 0;
@@ -276,6 +276,7 @@ static void begin_changed(cav_strategy *strategy, int n) {
     strategy[i].name = kept.name, strategy[i].text = kept.text, strategy[i].term = kept.term,
     strategy[i].nterm = kept.nterm, strategy[i].timestep = kept.timestep;
     strategy[i].schedule.light_avoided = kept.schedule.light_avoided;
+    strategy[i].schedule.calm = kept.schedule.calm;
     memcpy(strategy[i].changed, kept.changed, sizeof kept.changed);
   }
 }
@@ -289,6 +290,21 @@ static void add_avoiding(const cav_problem *problem, cav_strategy *strategy, int
   light.schedule.light_avoided = 1;
   snprintf(light.changed, sizeof light.changed, "light_avoided=\"true\"");
   add(strategy, n, &light, "avoid", "as the first one, with costs on what is to be avoided that grow over the stages");
+  add_near(strategy, n, stated, MEND);
+}
+
+/// With costs on the turning of roots that are heavier before the last stage: a way over the ground or over solids on which the
+/// trunk keeps still is often the better one, and easier to follow.
+static void add_calm(const cav_problem *problem, cav_strategy *strategy, int *n, const cav_strategy *stated) {
+  cav_strategy calm = *stated;
+  int turns = 0;
+  for (int i = 0; i < problem->nterm; i++) turns |= cav_term_calms(&problem->term[i]);
+  const int free = cav_first_free(problem->model) >= 0;
+  if (!turns || !free || problem->schedule.calm || problem->guess != CAV_GUESS_INTERPOLATE) return;
+  calm.schedule.calm = 1;
+  snprintf(calm.changed, sizeof calm.changed, "calm=\"true\"");
+  add(strategy, n, &calm, "calm",
+      "as the first one, with costs on the turning of roots that are heavier before the last stage");
   add_near(strategy, n, stated, MEND);
 }
 
@@ -497,6 +513,7 @@ cav_status cav_strategy_list(const cav_problem *problem, cav_strategy strategy[C
   int swings_up;
   cav_status status = add_stated(problem, strategy, n, &stated);
   if (status == CAV_OK) add_avoiding(problem, strategy, n, &stated);
+  if (status == CAV_OK) add_calm(problem, strategy, n, &stated);
   if (status == CAV_OK) status = find_guesses(problem, &stated, strategy, &g);
   if (status == CAV_OK) status = add_pushed(problem, strategy, n, &stated, &g);
   if (status == CAV_OK && !cav_upright_held(problem)) status = add_upright(problem, strategy, n, &stated);

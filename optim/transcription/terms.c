@@ -59,7 +59,8 @@ void cav_term_windows(cav_transcription *tr) {
 double cav_term_weight(const cav_transcription *tr, const cav_term *term, int t) {
   const cav_window *w = cav_term_window(tr, term);
   if (t < w->first || t > w->last) return 0;
-  return (w->single ? 1 : tr->options.timestep) * (cav_term_avoids(tr->model, term) ? 1 - tr->lightened : 1);
+  const double part = cav_term_avoids(tr->model, term) ? 1 - tr->lightened : cav_term_calms(term) ? 1 + tr->calmed : 1;
+  return (w->single ? 1 : tr->options.timestep) * part;
 }
 
 int cav_term_is_reading(const cav_term *term) {

@@ -160,6 +160,7 @@ typedef struct cav_transcription {
   double clearance;                 ///< m over the world in which speed along it costs; 0: nowhere
   cav_edges *edges;                 ///< NULL: no term asks for forces at edges
   double lightened;                 ///< part of costs on forces of bodies of the world that is left out
+  double calmed;                    ///< so many times more costs on the turning of roots weigh
   double depth_weight;              ///< 1/(m^2 s), of depth in the world beyond CAV_DEPTH_FREE; 0: none
   cav_derivative derivative;        ///< of u, contacts and sensors
   cav_derivative difference;        ///< what stands in where there is no analytic one
