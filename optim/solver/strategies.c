@@ -299,8 +299,8 @@ static void add_calm(const cav_problem *problem, cav_strategy *strategy, int *n,
   cav_strategy calm = *stated;
   int turns = 0;
   for (int i = 0; i < problem->nterm; i++) turns |= cav_term_calms(&problem->term[i]);
-  const int free = cav_first_free(problem->model) >= 0;
-  if (!turns || !free || problem->schedule.calm || problem->guess != CAV_GUESS_INTERPOLATE) return;
+  const int floats = cav_first_free(problem->model) >= 0;
+  if (!turns || !floats || problem->schedule.calm || problem->guess != CAV_GUESS_INTERPOLATE) return;
   calm.schedule.calm = 1;
   snprintf(calm.changed, sizeof calm.changed, "calm=\"true\"");
   add(strategy, n, &calm, "calm",
