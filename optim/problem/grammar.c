@@ -128,7 +128,7 @@ static const cav_xml_element pose = {
        "tolerance of the target, in the unit of the term, over the whole horizon too: the motion has achieved it if off by at most this, of a vector by its length, of a posture or a rate at each dof; \"any\": reported only")
 // what has no target has no tolerance; slip lets slide
 #define WITHIN_gap
-#define WITHIN_slip TEXT("within", "(0: they are not to slide)", "m/s: so fast these contacts may slide; \"any\": as fast as they like"),
+#define WITHIN_slip TEXT("within", "(0: they are not to slide)", "m/s: so fast these contacts may slide; \"any\": as fast as they like. Of a body that no actuator moves only those with others such and with the ground: a hand or a finger that may slide on it is named by its own body"),
 #define WITHIN_impact
 #define WITHIN_clearance
 #define WITHIN_self_penetration

@@ -1,7 +1,7 @@
 /// What the terms of a problem ask for beside what its start and goal have: a line a term, with units. Readings of places and
 /// orientations at both postures, of velocities at the start; forces are not known of a posture. And of single terms what
 /// their words hide: that a posture of joints leaves a free base open, that a force at an open end is never measured, that
-/// numbers are likely to be of another unit.
+/// numbers are likely to be of another unit, that a thing may have to slide or roll.
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>

@@ -54,6 +54,11 @@ static const struct {
      "key=\"stand\" of <start>, <goal>, <pose> and <waypoint> is a posture on the feet, found for any model that has "
      "feet;\n  others are found for any humanoid. height=\"floor\" beside it puts it on the floor",
      "postures"},
+    {"steady|wobble|wobbly|sway|swaying",
+     "a trunk is kept still by a heavier cost on its turning, <velocity dofs=\"root_angular\" weight=\"2\"/>, or, "
+     "before the "
+     "last\n  stage alone, by <schedule calm=\"true\">, which solve tries by itself",
+     "calm"},
     {"bridge|crook|supine|prone",
      "of <start>, <goal>, <pose> and <waypoint> key=\"lie-back\" lies face up, key=\"hook-lying\" too, with knees bent "
      "and "
