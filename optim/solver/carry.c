@@ -1,7 +1,7 @@
 /// Both hands to a free body that is asked for elsewhere, or to a door or a drawer. Where what has hands stands on a free base,
 /// one hand alone turns or tips what is heavy, and a guess in which the base stays where it is pushes as far as arms reach. So
-/// both are led: to the side that it is pushed from, as low as it does not tip, or where it is to be lifted to its two sides;
-/// the base goes along. Terms of a cost lead, and are no part of the problem.
+/// both are led: to the side that it is pushed from, as low as it does not tip, or where it is to be lifted to its two sides,
+/// over what is in its way; the base goes along, as far as solids let it. Terms of a cost lead, and are no part of the problem.
 #include "carry.h"
 
 #include <math.h>
@@ -272,18 +272,20 @@ static int is_arm(const hands *h, int link) {
   return 0;
 }
 
-/// How deep what has the hands, but for its arms, is in solids of the world where its root is aside by a way, m.
-static cav_status depth_aside(const hands *h, const cav_carry *c, const double way[2], double *q, double *depth) {
+/// How deep the thing, or else what has the hands but for its arms, is in solids of the world, m, where its free joint is aside
+/// of the start by a way.
+static cav_status depth_aside(const hands *h, const cav_carry *c, int thing, const double way[3], double *q,
+                              double *depth) {
   const cav_model *m = h->m;
-  const int root = m->link[m->body[m->joint[c->root].body].link].root;
+  const cav_joint *joint = &m->joint[thing ? c->thing : c->root];
   memcpy(q, h->problem->q_start, (size_t)m->nq * sizeof *q);
-  for (int k = 0; k < 2; k++) q[m->joint[c->root].q + k] += way[k];
+  add3(q + joint->q, q + joint->q, way);
   const cav_status status = cav_position(m, h->state, q);
   *depth = 0;
   for (int i = 0; i < h->state->ncontact && !status; i++) {
     const cav_contact *contact = &h->state->contact[i];
     const int link = contact->link1 ? contact->link1 : contact->link2;
-    if (m->link[link].root != root || !cav_is_with_solid(m, contact) || is_arm(h, link)) continue;
+    if (m->link[link].root != m->link[joint->link].root || !cav_is_with_solid(m, contact) || is_arm(h, link)) continue;
     *depth = fmax(*depth, -contact->dist);
   }
   return status;
@@ -292,12 +294,12 @@ static cav_status depth_aside(const hands *h, const cav_carry *c, const double w
 /// Shortens a way of the root on from another one until it leads no deeper into a solid than the start is: a table's edge, say.
 static cav_status stop_at_solids(const hands *h, const cav_carry *c, const double from[2], double way[2]) {
   enum { PARTS = 8 };
-  double *q = calloc((size_t)h->m->nq, sizeof *q), depth = 0, before = 0, aside[2] = {0, 0};
-  cav_status status = q ? depth_aside(h, c, aside, q, &before) : CAV_NO_MEMORY;
+  double *q = calloc((size_t)h->m->nq, sizeof *q), depth = 0, before = 0, aside[3] = {0};
+  cav_status status = q ? depth_aside(h, c, 0, aside, q, &before) : CAV_NO_MEMORY;
   int part = PARTS;
   for (; part > 0 && !status; part--) {
     for (int k = 0; k < 2; k++) aside[k] = from[k] + way[k] * part / PARTS;
-    status = depth_aside(h, c, aside, q, &depth);
+    status = depth_aside(h, c, 0, aside, q, &depth);
     if (depth <= before + shallow) break;
   }
   for (int k = 0; k < 2; k++) way[k] *= (double)part / PARTS;
@@ -332,22 +334,7 @@ static cav_status find_carry(hands *h, double away, cav_carry *c) {
   return status;
 }
 
-/// How deep what is carried is in solids of the world, aside from where it is at the start, m.
-static cav_status depth_of_thing(const hands *h, const cav_carry *c, const double way[3], double *q, double *depth) {
-  const cav_model *m = h->m;
-  memcpy(q, h->problem->q_start, (size_t)m->nq * sizeof *q);
-  for (int k = 0; k < 3; k++) q[m->joint[c->thing].q + k] += way[k];
-  const cav_status status = cav_position(m, h->state, q);
-  *depth = 0;
-  for (int i = 0; i < h->state->ncontact && !status; i++) {
-    const cav_contact *contact = &h->state->contact[i];
-    if ((contact->link1 ? contact->link1 : contact->link2) != h->thing.link || !cav_is_with_solid(m, contact)) continue;
-    *depth = fmax(*depth, -contact->dist);
-  }
-  return status;
-}
-
-/// How deep it comes into solids on its way, m: straight, or up to a height over the start, along and down.
+/// How deep what is carried comes into solids on its way, m: straight, or up to a height over the start, along and down.
 static cav_status depth_on_way(const hands *h, const cav_carry *c, const double *over, double *q, double *most) {
   enum { PARTS = 12 };
   const double *to = h->thing.way;
@@ -361,7 +348,7 @@ static cav_status depth_on_way(const hands *h, const cav_carry *c, const double 
     double way[3], depth = 0;
     for (int k = 0; k < 3; k++)
       way[k] = over ? bend[part][k] + along * (bend[part + 1][k] - bend[part][k]) : to[k] * i / (3 * PARTS);
-    status = depth_of_thing(h, c, way, q, &depth);
+    status = depth_aside(h, c, 1, way, q, &depth);
     *most = fmax(*most, depth);
   }
   return status;
@@ -373,7 +360,7 @@ static cav_status find_over(const hands *h, cav_carry *c) {
   double *q = calloc((size_t)h->m->nq, sizeof *q), depth = 0, before = 0, over = fmax(h->thing.way[2], 0);
   static const double still[3] = {0, 0, 0};
   const double most = over + highest;
-  cav_status status = q ? depth_of_thing(h, c, still, q, &before) : CAV_NO_MEMORY;
+  cav_status status = q ? depth_aside(h, c, 1, still, q, &before) : CAV_NO_MEMORY;
   if (!status) status = depth_on_way(h, c, NULL, q, &depth);
   const int blocked = depth > before + sunk;
   for (; blocked && !status && over < most; over += higher) {
@@ -404,10 +391,10 @@ cav_status cav_carry_find(const cav_problem *problem, double away, cav_carry *ca
     carry->root = free_joint(m, m->body[roles.body[CAV_ROLE_RIGHT_HAND]].link);
     const int alone = m->link[h.thing.link].root == h.thing.link;
     const int usable = carry->thing >= 0 && carry->root >= 0 && alone && is_still(problem, carry->thing);
-    if (usable && !carry->hung) status = find_over(&h, carry);
+    const int able = usable && find_hands(&h, &roles, carry->root);
+    if (able && !carry->hung) status = find_over(&h, carry);
     carry->lifts |= carry->over > 0;
-    if (usable && !status && find_hands(&h, &roles, carry->root) && (carry->lifts || !is_pulled(&h)))
-      status = find_carry(&h, away, carry);
+    if (able && !status && (carry->lifts || !is_pulled(&h))) status = find_carry(&h, away, carry);
   }
   cav_state_free(state);
   return status;

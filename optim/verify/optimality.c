@@ -137,12 +137,15 @@ static cav_status add_knot(model *s, int t, int nbinding, const cav_binding *bin
       add_bounded(s, t, row, x, J);
     }
   }
-  // what is not a number is no reason to leave the columns that are unknowns: it is found in the factor
-  for (int i = 0; i < k->width; i++)
-    for (int j = 0; j <= i && cav_knot_jacobian_unknown(k, t, i) >= 0; j++)
-      if (s->local[i * k->width + j] != 0 && cav_knot_jacobian_unknown(k, t, j) >= 0)
-        cav_envelope_add(s->hessian, cav_knot_jacobian_unknown(k, t, i), cav_knot_jacobian_unknown(k, t, j),
-                         s->local[i * k->width + j]);
+  // of what is not a number there are entries in columns that are no unknowns; the others are found in the factor
+  for (int i = 0; i < k->width; i++) {
+    const int row = cav_knot_jacobian_unknown(k, t, i);
+    for (int j = 0; j <= i && row >= 0; j++) {
+      const double entry = s->local[i * k->width + j];
+      const int column = entry != 0 ? cav_knot_jacobian_unknown(k, t, j) : -1;
+      if (column >= 0) cav_envelope_add(s->hessian, row, column, entry);
+    }
+  }
   return status;
 }
 
