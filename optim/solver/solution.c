@@ -112,7 +112,7 @@ static cav_status find_excess(const cav_solve_run *run, double *excess) {
   cav_verdict v = {0};
   cav_error ignored = {0};
   const cav_options law = run->tr->options;
-  const cav_status status = cav_verify(run->problem, run->at, &law, NULL, NULL, &v, &ignored);
+  const cav_status status = cav_verify_knots(run->problem, run->at, &law, &v, &ignored);
   const double over[] = {v.slip_mean_m_s / CAV_TOLERANCE_SLIP, v.hover_fraction / CAV_TOLERANCE_HOVER,
                          v.momentum_defect_rms / CAV_TOLERANCE_MOMENTUM,
                          v.penetration_max_m / CAV_TOLERANCE_PENETRATION,

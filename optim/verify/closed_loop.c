@@ -39,26 +39,41 @@ size_t cav_before_numbers(const cav_verification *verification) {
   return (size_t)verification->model->nq + 2 * (size_t)verification->model->nv;
 }
 
+/// Pushes of one size all four ways, worst way first, until one is lost; order is that of the next size.
+static cav_status push_all_ways(const cav_verification *verification, const double *gain_q, const double *gain_v,
+                                double size, cav_disturbance *push, int order[4], int *survived) {
+  static const double way[4][2] = {{1, 0}, {-1, 0}, {0, 1}, {0, -1}};
+  struct cav_follow follow = {0};
+  double error[4];
+  cav_status status = CAV_OK;
+  for (int i = 0; i < 4 && status == CAV_OK && !*follow.lost; i++) {
+    const int k = order[i];
+    push->impulse[0] = size * way[k][0], push->impulse[1] = size * way[k][1];
+    status = cav_replay_own(verification, 0, gain_q, gain_v, push, &follow);
+    error[k] = follow.error;
+  }
+  *survived = status == CAV_OK && !*follow.lost;
+  if (*survived) put_worst_first(order, error);
+  return status;
+}
+
 cav_status cav_closed_loops_push(const cav_verification *verification, const double *gain_q, const double *gain_v,
                                  double *survived) {
-  static const double way[4][2] = {{1, 0}, {-1, 0}, {0, 1}, {0, -1}};
   cav_before before = {.x = malloc(cav_before_numbers(verification) * sizeof *before.x)};
   cav_disturbance push = {.link = pushed_link(verification), .fraction = pushed_at, .before = &before};
   cav_status status = before.x ? CAV_OK : CAV_NO_MEMORY;
-  struct cav_follow follow = {0};
-  int order[4] = {0, 1, 2, 3};
-  double error[4];
-  *survived = push.link > 0 ? 0 : NAN;
-  for (int rung = 0; rung < PUSHES && push.link > 0 && status == CAV_OK && !*follow.lost; rung++) {
-    double size = ldexp(small_push * verification->weight, rung);
-    for (int i = 0; i < 4 && status == CAV_OK && !*follow.lost; i++) {
-      const int k = order[i];
-      push.impulse[0] = size * way[k][0], push.impulse[1] = size * way[k][1];
-      status = cav_replay_own(verification, 0, gain_q, gain_v, &push, &follow);
-      error[k] = follow.error;
-    }
-    if (status == CAV_OK && !*follow.lost) put_worst_first(order, error);
-    if (status == CAV_OK && !*follow.lost) *survived = size;
+  int order[4] = {0, 1, 2, 3}, stands = push.link > 0;
+  *survived = stands ? 0 : NAN;
+  // most motions survive the second: the first is tried where it is lost
+  for (int rung = 1; rung < PUSHES && stands && status == CAV_OK; rung++) {
+    const double size = ldexp(small_push * verification->weight, rung);
+    status = push_all_ways(verification, gain_q, gain_v, size, &push, order, &stands);
+    if (stands) *survived = size;
+  }
+  if (*survived == 0 && status == CAV_OK) {
+    const double size = small_push * verification->weight;
+    status = push_all_ways(verification, gain_q, gain_v, size, &push, order, &stands);
+    if (stands) *survived = size;
   }
   free(before.x);
   return status;

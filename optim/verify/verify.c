@@ -378,9 +378,19 @@ static void fill(const cav_verification *verification, const metrics *found, con
   verdict->duration = verification->last * verification->h;
 }
 
+/// Whether a verification simulates the motion as well.
+enum { KNOTS_ALONE, SIMULATED };
+
+static cav_status simulate(cav_verification *verification, const cav_followed *followed, const double *gain_q,
+                           const double *gain_v, cav_replay *replay) {
+  cav_status status = cav_replay_steps(verification, replay);
+  if (status == CAV_OK) status = cav_replay_open(verification, replay);
+  return status == CAV_OK ? cav_closed_loops_certify(verification, followed, gain_q, gain_v, replay) : status;
+}
+
 static cav_status verify(const cav_problem *problem, const cav_trajectory *trajectory, const cav_options *contact,
-                         const double *gain_q, const double *gain_v, const cav_followed *followed, cav_verdict *verdict,
-                         cav_error *error) {
+                         const double *gain_q, const double *gain_v, const cav_followed *followed, int simulated,
+                         cav_verdict *verdict, cav_error *error) {
   if (!verdict) return cav_verification_fail(error, CAV_BAD_INPUT, "verification needs a place for its verdict");
   verdict->certified = verdict->achieved = 0;
   snprintf(verdict->reason, sizeof verdict->reason, "not verified");
@@ -396,13 +406,11 @@ static cav_status verify(const cav_problem *problem, const cav_trajectory *traje
   if (status == CAV_OK && !report) status = CAV_NO_MEMORY;
   if (status == CAV_OK) status = examine(&verification, balance, &found, report, error);
   if (status == CAV_OK) status = cav_verification_between(&verification, &found.between);
-  if (status == CAV_OK) status = cav_replay_steps(&verification, &replay);
-  if (status == CAV_OK) status = cav_replay_open(&verification, &replay);
-  if (status == CAV_OK) status = cav_closed_loops_certify(&verification, followed, gain_q, gain_v, &replay);
+  if (status == CAV_OK && simulated) status = simulate(&verification, followed, gain_q, gain_v, &replay);
   if (status == CAV_OK) {
-    *verdict->reason = 0;
+    if (simulated) *verdict->reason = 0;
     fill(&verification, &found, &replay, verdict);
-    decide(&verification, &found, &replay, verdict);
+    if (simulated) decide(&verification, &found, &replay, verdict);
     cav_targets_verdict(&verification, report, found.residual.cost, verdict);
     status = cav_verification_ending(&verification, verdict);
   }
@@ -417,16 +425,21 @@ static cav_status verify(const cav_problem *problem, const cav_trajectory *traje
   return status;
 }
 
+cav_status cav_verify_knots(const cav_problem *problem, const cav_trajectory *trajectory, const cav_options *contact,
+                            cav_verdict *verdict, cav_error *error) {
+  return verify(problem, trajectory, contact, NULL, NULL, NULL, KNOTS_ALONE, verdict, error);
+}
+
 cav_status cav_verify(const cav_problem *problem, const cav_trajectory *trajectory, const cav_options *contact,
                       const double *gain_q, const double *gain_v, cav_verdict *verdict, cav_error *error) {
-  return verify(problem, trajectory, contact, gain_q, gain_v, NULL, verdict, error);
+  return verify(problem, trajectory, contact, gain_q, gain_v, NULL, SIMULATED, verdict, error);
 }
 
 cav_status cav_verify_solution(const cav_problem *problem, const cav_solution *solution, cav_verdict *verdict,
                                cav_error *error) {
   if (!solution) return cav_verification_fail(error, CAV_BAD_INPUT, "there is no solution to verify");
   return verify(problem, solution->trajectory, &solution->contact, solution->gain_q, solution->gain_v,
-                solution->followed, verdict, error);
+                solution->followed, SIMULATED, verdict, error);
 }
 
 cav_status cav_terms_report(const cav_problem *problem, const cav_trajectory *trajectory, const cav_options *contact,
