@@ -685,12 +685,100 @@ static void test_peer(void) {
 }
 #endif
 
+// places b turned and shifted by a part of unit twist k about a point
+static cav_shape twisted(const cav_shape *b, const double point[3], int k, double part) {
+  cav_shape to = *b;
+  double w[3] = {0}, quat[4], R[9], arm[3];
+  if (k >= 3) {
+    to.pos[k - 3] += part;
+    return to;
+  }
+  w[k] = part;
+  quat_exp(quat, w);
+  quat_matrix(R, quat);
+  matmul3(to.rotation, R, b->rotation);
+  sub3(arm, b->pos, point);
+  rotate(arm, R, arm);
+  add3(to.pos, point, arm);
+  return to;
+}
+
+// farthest of a rate from centred differences of the narrow phase over a step; infinite where the point comes or goes
+static double off_differences(const cav_shape *a, const cav_shape *b, const double point[3], int feature, int k,
+                              double step, const cav_touch *rate) {
+  cav_touch side[2][CAV_TOUCH_MAX];
+  const cav_touch *at[2];
+  for (int i = 0; i < 2; i++) {
+    const cav_shape moved = twisted(b, point, k, i ? step : -step);
+    at[i] = with_feature(side[i], cav_collide_shapes(a, &moved, 0.2, side[i]), feature);
+    if (!at[i]) return INFINITY;
+  }
+  double off = fabs((at[1]->dist - at[0]->dist) / (2 * step) - rate->dist);
+  for (int i = 0; i < 3; i++) {
+    off = fmax(off, fabs((at[1]->pos[i] - at[0]->pos[i]) / (2 * step) - rate->pos[i]));
+    off = fmax(off, fabs((at[1]->normal[i] - at[0]->normal[i]) / (2 * step) - rate->normal[i]));
+  }
+  return off;
+}
+
+/// Rates of points on a box by its twists, in closed form, against differences of two steps, but where the points' ways have a
+/// kink or bend by much within the longer one. Lying, leaning and upright capsules, over faces, edges and corners; spheres.
+static void test_rates_on_box(void) {
+  int points = 0, unknown = 0, kinks = 0;
+  double most = 0;
+  for (int pose = 0; pose < 4000; pose++) {
+    solid a, b;
+    random_solid(pose % 4 ? CAV_GEOM_CAPSULE : CAV_GEOM_SPHERE, &a);
+    random_solid(CAV_GEOM_BOX, &b);
+    if (pose % 3 == 0) {
+      // nearly along a face
+      const double lean[3] = {uniform(-0.05, 0.05), uniform(-0.05, 0.05), 0}, flat[3] = {0, M_PI / 2, 0};
+      double turn[4], along[4], q[4];
+      quat_exp(along, flat), quat_exp(turn, lean);
+      quat_mul(q, turn, along);
+      quat_mul(a.quat, b.quat, q);
+      quat_matrix(a.shape.rotation, a.quat);
+    }
+    bring_near(&a, &b);
+    const double point[3] = {b.shape.pos[0] + uniform(-1, 1), b.shape.pos[1] + uniform(-1, 1), b.shape.pos[2]};
+    cav_touch touch[2], rate[2][6];
+    const int n = cav_segment_rates(&a.shape, &b.shape, 0.2, point, touch, rate);
+    unknown += n < 0;
+    cav_touch same[CAV_TOUCH_MAX];
+    const int count = cav_collide_shapes(&a.shape, &b.shape, 0.2, same);
+    CHECK(n < 0 || n == count);
+    for (int i = 0; i < n; i++) {
+      const cav_touch *is = with_feature(same, count, touch[i].feature);
+      if (!CHECK(is && is->dist == touch[i].dist)) continue;
+      for (int c = 0; c < 3; c++) {
+        CHECK_NEAR(touch[i].pos[c], is->pos[c], 1e-14);
+        CHECK_NEAR(touch[i].normal[c], is->normal[c], 1e-14);
+      }
+      for (int k = 0; k < 6; k++) {
+        const double wide = off_differences(&a.shape, &b.shape, point, touch[i].feature, k, 1e-4, &rate[i][k]);
+        const double narrow = off_differences(&a.shape, &b.shape, point, touch[i].feature, k, 1e-6, &rate[i][k]);
+        points++;
+        if (narrow < 1e-5 && wide < 0.1)
+          most = fmax(most, narrow);
+        else
+          kinks++;
+      }
+    }
+  }
+  printf("rates on boxes: %d off differences by at most %.1e, and %d at kinks; %d of 4000 poses not in closed form\n",
+         points, most, kinks, unknown);
+  // seen: 42000, 3.3e-6, 80, 0
+  CHECK(points > 40000 && kinks < 120 && unknown < 40);
+  CHECK(most < 1e-5);
+}
+
 int main(void) {
   test_certificates();
   test_margins();
   test_deep();
   test_invariance();
   test_derivatives();
+  test_rates_on_box();
   test_degenerate();
   test_manifolds();
   test_led_over_box();

@@ -79,6 +79,8 @@ static double ending_derivative(double x, double width) {
 // area is filled on request only: it is the costly piece.
 static smooth smooth_positive(double x, int ends, int area) {
   if (ends && x < END + WIDTH) return ending(x);
+  // far inside one more than the tail is one, and what it adds is lost in what there is
+  if (x > 38.0 && !area) return (smooth){0.0, 1.0, 0.0};
   const double tail = exp(-fabs(x));
   // so far off that one more than the tail is one, exactly
   if (tail < 0x1p-54 && !area) return (smooth){tail, x > 0.0 ? 1.0 : tail, 0.0};

@@ -32,25 +32,30 @@ static lesser exact_lesser(double a, double b) {
   return a <= b ? (lesser){1.0, 1.0, 0.0} : (lesser){b / a, 0.0, 1.0};
 }
 
-// sinh(y)/(cosh(x) + cosh(y)) at x = a/tau, y = b/tau, and with x and y the other way round
-static void fill_derivatives(double a, double b, double tau, lesser *m) {
-  const double most = a > b ? a : b, up_a = exp((a - most) / tau), up_b = exp((b - most) / tau);
-  const double down_a = exp(-(a + most) / tau), down_b = exp(-(b + most) / tau);
-  m->a = -up_b * expm1(-2.0 * b / tau) / (up_b + up_a + down_a + down_b);
-  m->b = -up_a * expm1(-2.0 * a / tau) / (up_a + up_b + down_b + down_a);
-}
+// from where on a number and one more than its e^-x are the same
+static const double NOTHING = 38.0;
 
-// the derivatives on request only: they are the costly piece
+static double decay(double x) { return x < NOTHING ? exp(-x) : 0.0; }
+
+// 1 - e^-x
+static double rise(double x) { return x < NOTHING ? -expm1(-x) : 1.0; }
+
+// the derivatives on request only: sinh(y)/(cosh(x) + cosh(y)) at x = a/tau, y = b/tau, and with x and y the other way round.
+// With u = e^-x, w = e^-y the first is u (1 - w^2)/((u + w) (1 + u w)): near is the lesser of u/w and w/u, far is u w
 static lesser smooth_lesser(double a, double b, double tau, int derivatives) {
   lesser m = {0.0, 0.0, 0.0};
-  if (derivatives) fill_derivatives(a, b, tau, &m);
-  const double low = a < b ? a : b;
+  const double low = a < b ? a : b, near = exp(-fabs(a - b) / tau), far = decay((a + b) / tau);
+  if (derivatives) {
+    const double lower = 1.0 / (1.0 + near) / (1.0 + far), higher = near * lower;
+    m.a = (a < b ? lower : higher) * rise(2.0 * b / tau);
+    m.b = (a < b ? higher : lower) * rise(2.0 * a / tau);
+  }
   if (!(a > 0.0))
     m.ratio = tanh(0.5 * b / tau);
   else if (low < tau)
     m.ratio = atanh(tanh(0.5 * a / tau) * tanh(0.5 * b / tau)) / (0.5 * a / tau);
   else
-    m.ratio = (low + tau * (log1p(exp(-(a + b) / tau)) - log1p(exp(-fabs(a - b) / tau)))) / a;
+    m.ratio = (low + tau * (log1p(far) - log1p(near))) / a;
   return m;
 }
 

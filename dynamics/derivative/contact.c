@@ -479,15 +479,29 @@ typedef struct law_derivative {
   double by_dist[6]; ///< df by the distance, velocities fixed
 } law_derivative;
 
+// the law's derivative as it was found with the contact's impulse, 0 where it was not
+static int take_law(const cav_state *state, const cav_contact *c, double *H) {
+  const cav_workspace *w = state->work;
+  const ptrdiff_t i = c - state->contact;
+  if (c->dim > 3 || i >= w->law_room || !(w->law[CAV_LAW_NUMBERS * i] >= 0)) return 0;
+  memcpy(H, w->law + CAV_LAW_NUMBERS * i, (size_t)(c->dim * c->dim) * sizeof *H);
+  return 1;
+}
+
 static void differentiate_law(const cav_model *model, const cav_state *state, const cav_contact *c, double *H,
                               law_derivative *law) {
   double z[6], g[6], f[6], reaction[6], regulariser, stiffness, fraction;
   for (int k = 0; k < c->dim; k++) {
-    z[k] = (1 - c->damping[k]) * c->velocity[k] - c->velocity_next[k];
-    if (k == 0) z[k] -= c->stiffness * (c->dist - c->margin) + cav_contact_excess(state, c);
+    // with the operations of cav_contact_impulse
+    double target = (1 - c->damping[k]) * c->velocity[k];
+    if (k == 0) target -= c->stiffness * (c->dist - c->margin);
+    z[k] = target - c->velocity_next[k] - (k == 0 ? cav_contact_excess(state, c) : 0);
     g[k] = z[k] / c->regulariser[k];
   }
-  cav_law_contact(state, c, g, f, H);
+  if (take_law(state, c, H))
+    memcpy(f, c->impulse, (size_t)c->dim * sizeof *f);
+  else
+    cav_law_contact(state, c, g, f, H);
   cav_law_rates(state, &model->pair[c->pair].softness, c->dist - c->margin, c->regulariser[0], &regulariser,
                 &stiffness);
   cav_contact_stiffness_ratio(state, c, &fraction);

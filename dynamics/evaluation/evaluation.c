@@ -21,10 +21,11 @@ enum { STRETCHES = 5 };
 struct cav_evaluation {
   int kept; ///< 0: nothing
   cav_options options;
-  int ncontact, nrow, nequality, narrowed, contact_room, row_room;
+  int ncontact, nrow, nequality, narrowed, contact_room, row_room, law_room;
   double discrete_damping, discrete_stiffness;
   cav_contact *contact;
   cav_row *row;
+  double *law;   ///< of the contacts
   double *q;     ///< [nq] as it was given: the state's has unit quaternions
   char *numbers; ///< of the stretches
 };
@@ -58,7 +59,7 @@ static cav_evaluation *evaluation_new(const cav_model *model, size_t bytes) {
 
 void cav_evaluation_free(cav_evaluation *e) {
   if (!e) return;
-  free(e->contact), free(e->row), free(e->q), free(e->numbers);
+  free(e->contact), free(e->row), free(e->law), free(e->q), free(e->numbers);
   free(e);
 }
 
@@ -86,8 +87,10 @@ static void exchange(cav_evaluation *e, cav_state *state) {
   cav_workspace *w = state->work;
   e->contact = state->contact, e->contact_room = w->contact_room;
   e->row = state->row, e->row_room = w->row_room;
+  e->law = w->law, e->law_room = w->law_room;
   state->contact = had.contact, w->contact_room = had.contact_room;
   state->row = had.row, w->row_room = had.row_room;
+  w->law = had.law, w->law_room = had.law_room;
 }
 
 // whether what is kept here is all that an evaluation leaves

@@ -105,7 +105,7 @@ int cav_hfield_prism(const cav_shape *field, int feature, cav_prism *prism);
 
 /// Contact points of one pair as it is and displaced, for differences. pair is -1 at the start.
 typedef struct cav_pair_manifolds {
-  int pair, displaced;
+  int pair, displaced; ///< 2: rates are known in closed form, of the points as the pair is
   int faces; ///< points over a face of one of the two, -1: not looked for
   cav_face_point face[CAV_FACE_POINTS];
   cav_shape a, b;
@@ -114,6 +114,7 @@ typedef struct cav_pair_manifolds {
   double point[3];     ///< of the twists
   int count[13];       ///< after -, + each of six unit twists, then as it is
   cav_touch touch[13][CAV_TOUCH_MAX];
+  cav_touch rate[2][6]; ///< in closed form
 } cav_pair_manifolds;
 
 /// Takes up a pair whose shapes a and b the caller fills in. touch_rates.c.

@@ -22,6 +22,11 @@ int cav_mesh_summit_from(const cav_mesh *mesh, const double direction[3], int ne
 /// Segment swept by a sphere (the capsule a) against a solid b with a surface: up to 2 points. segment.c.
 int cav_collide_segment(const cav_shape *a, const cav_shape *b, double margin, cav_touch *touch);
 
+/// The same of a capsule or a sphere against a box, and their rates by unit twists (angular, linear) of the box about a world
+/// point [3]: rate[2][6]. -1: the points jump, or the segment cuts the box. segment.c.
+int cav_segment_rates(const cav_shape *a, const cav_shape *b, double margin, const double point[3], cav_touch *touch,
+                      cav_touch (*rate)[6]);
+
 /// A mesh against a plane: its lowest vertex, and those that would be lowest if it leant to four sides. polytope.c.
 int cav_collide_plane_mesh(const cav_shape *a, const cav_shape *b, double margin, cav_touch *touch);
 

@@ -189,10 +189,12 @@ static void clip_box(const segment *g, const lowest *best, double *low, double *
   *high = fmax(*high, best->t);
 }
 
+// sine from which on a capsule is too steep for a second point
+static const double FLAT = 0.5;
+
 // how far the second point goes from the lowest towards an end of the part: all the way where the segment lies flat,
 // nowhere where it rises steeper than FLAT
 static double draw(const segment *g, const lowest *best, double end) {
-  static const double FLAT = 0.5; // sine
   double length = fabs(end - best->t) * norm3(g->half), normal[3];
   if (length == 0) return 0;
   double s = (height_along(g, end, best->normal, normal) - best->height) / (length * FLAT),
@@ -200,30 +202,40 @@ static double draw(const segment *g, const lowest *best, double end) {
   return fraction * fraction * (end - best->t);
 }
 
-static int collide_box(const cav_shape *a, const cav_shape *b, const segment *g, const lowest *best, double margin,
-                       cav_touch *touch) {
-  lowest first = *best, second;
-  double end[2], normal[3], flat = 1e-12 * (norm3(g->half) + a->size[0]);
+// both points on a box and the ends of the part above it; 1 where anywhere along it is as low: it rests on both ends
+static int rest_on_box(const segment *g, double radius, const lowest *best, double end[2], lowest *first,
+                       lowest *second) {
+  double normal[3], flat = 1e-12 * (norm3(g->half) + radius);
+  int level = 0;
+  *first = *best;
   clip_box(g, best, &end[0], &end[1]);
-  second.t = best->t + draw(g, best, end[0]) + draw(g, best, end[1]);
-  for (int k = 0; k < 2; k++) {
-    // anywhere along it is as low: it rests on both ends
+  second->t = best->t + draw(g, best, end[0]) + draw(g, best, end[1]);
+  for (int k = 0; k < 2 && !level; k++) {
     double height = height_along(g, end[k], best->normal, normal);
     if (end[k] == best->t || height - best->height > flat) continue;
-    first = (lowest){.t = end[k], .height = height};
-    copy3(first.normal, normal);
-    second.t = end[k] + draw(g, &first, end[!k]);
-    break;
+    *first = (lowest){.t = end[k], .height = height};
+    copy3(first->normal, normal);
+    second->t = end[k] + draw(g, first, end[!k]);
+    level = 1;
   }
-  second.height = first.height;
-  copy3(second.normal, first.normal);
-  if (second.t != first.t) second.height = height_along(g, second.t, first.normal, second.normal);
+  second->height = first->height;
+  copy3(second->normal, first->normal);
+  if (second->t != first->t) second->height = height_along(g, second->t, first->normal, second->normal);
+  return level;
+}
+
+static int collide_box(const cav_shape *a, const cav_shape *b, const segment *g, const lowest *best, double margin,
+                       cav_touch *touch) {
+  lowest first, second;
+  double end[2];
+  rest_on_box(g, a->size[0], best, end, &first, &second);
   int late = first.t > second.t;
   int count = touch_at(a, b, g, first.t, first.height, first.normal, margin, late, touch);
   return count + touch_at(a, b, g, second.t, second.height, second.normal, margin, !late, touch + count);
 }
 
-int cav_collide_segment(const cav_shape *a, const cav_shape *b, double margin, cav_touch *touch) {
+// the axis of a capsule in the axes of a solid, a point for a sphere
+static segment segment_of(const cav_shape *a, const cav_shape *b) {
   segment g = {.type = b->type, .size = b->size};
   g.surface = b->type == CAV_GEOM_BOX        ? cav_surface_box
               : b->type == CAV_GEOM_CYLINDER ? cav_surface_cylinder
@@ -231,10 +243,15 @@ int cav_collide_segment(const cav_shape *a, const cav_shape *b, double margin, c
   double d[3], axis[3];
   sub3(d, a->pos, b->pos);
   rotate_back(g.centre, b->rotation, d);
+  if (a->type != CAV_GEOM_CAPSULE) return g;
   column3(axis, a->rotation, 2);
   scale3(axis, a->size[1], axis);
   rotate_back(g.half, b->rotation, axis);
+  return g;
+}
 
+int cav_collide_segment(const cav_shape *a, const cav_shape *b, double margin, cav_touch *touch) {
+  segment g = segment_of(a, b);
   lowest first;
   find_lowest(&g, &first);
   if (first.height - a->size[0] >= margin) return 0;
@@ -262,4 +279,185 @@ int cav_collide_segment(const cav_shape *a, const cav_shape *b, double margin, c
   double height = height_along(&g, ends[far], first.normal, normal);
   count += touch_at(a, b, &g, ends[far], height, normal, margin, far, touch + count);
   return count;
+}
+
+// --- rates by unit twists of a box ---
+
+/// Of a segment by each of six twists of the box about a point, in the box's axes.
+typedef struct drift {
+  double centre[6][3], half[6][3];
+} drift;
+
+/// Of a point on the box: the place along the segment, the height there and the normal.
+typedef struct slopes {
+  double t[6], height[6], normal[6][3];
+} slopes;
+
+static drift drift_of(const cav_shape *a, const cav_shape *b, const segment *g, const double point[3]) {
+  drift m;
+  double arm[3], half[3], moved[3];
+  sub3(arm, a->pos, point);
+  rotate(half, b->rotation, g->half);
+  for (int k = 0; k < 6; k++) {
+    const double e[3] = {k % 3 == 0, k % 3 == 1, k % 3 == 2};
+    zero3(m.half[k]);
+    if (k >= 3) {
+      scale3(moved, -1, e);
+    } else {
+      cross3(moved, arm, e);
+      rotate_back(m.centre[k], b->rotation, moved);
+      cross3(moved, half, e);
+      rotate_back(m.half[k], b->rotation, moved);
+      continue;
+    }
+    rotate_back(m.centre[k], b->rotation, moved);
+  }
+  return m;
+}
+
+// which coordinates a point above the box at t is beyond; their number, 0 below its surface
+static int beyond(const segment *g, const lowest *p, int out[3]) {
+  double x[3];
+  int n = 0;
+  point_at(g, p->t, x);
+  for (int i = 0; i < 3; i++) n += out[i] = p->height > 0 && fabs(x[i]) > g->size[i];
+  return n;
+}
+
+// of the height and the normal, from those of the place. Over a face the normal stays; over an edge and a corner it turns
+static void find_slopes(const segment *g, const drift *m, const lowest *p, slopes *s) {
+  int out[3];
+  const int round = beyond(g, p, out) > 1;
+  for (int k = 0; k < 6; k++) {
+    double x[3];
+    axpy3(x, m->centre[k], s->t[k], g->half);
+    axpy3(x, x, p->t, m->half[k]);
+    s->height[k] = dot3(p->normal, x);
+    for (int i = 0; i < 3; i++)
+      s->normal[k][i] = round && out[i] ? (x[i] - p->normal[i] * s->height[k]) / p->height : 0;
+  }
+}
+
+// of the lowest place: none at an end; else where the normal over an edge or a corner stays square to the segment. 0: it jumps
+static int find_place_slopes(const segment *g, const drift *m, const lowest *p, double t[6]) {
+  static const double least = 1e-9;
+  int out[3];
+  for (int k = 0; k < 6; k++) t[k] = 0;
+  if (fabs(p->t) == 1) return 1;
+  const double along = dot3(p->normal, g->half), size = dot3(g->half, g->half);
+  if (beyond(g, p, out) < 2 || !(fabs(along) <= 1e-12 * sqrt(size))) return 0;
+  // the second derivative of the height along the segment, times the height
+  double turned[3];
+  for (int i = 0; i < 3; i++) turned[i] = out[i] ? g->half[i] - p->normal[i] * along : 0;
+  const double bend = dot3(g->half, turned);
+  if (!(bend > least * size)) return 0;
+  for (int k = 0; k < 6; k++) {
+    double x[3];
+    axpy3(x, m->centre[k], p->t, m->half[k]);
+    t[k] = -(dot3(turned, x) + p->height * dot3(p->normal, m->half[k])) / bend;
+  }
+  return 1;
+}
+
+// of an end of the part above the box (clip_box)
+static void find_end_slopes(const segment *g, const drift *m, const lowest *best, const slopes *s, double end,
+                            double out[6]) {
+  const double room = norm3(g->half) + fmax(best->height, 0);
+  for (int k = 0; k < 6; k++) out[k] = end == best->t ? s->t[k] : 0;
+  if (end == best->t || fabs(end) == 1) return;
+  for (int i = 0; i < 3; i++) {
+    const double n = fabs(best->normal[i]), part = 1 / (1 - 2 * n), sign = best->normal[i] < 0 ? -1 : 1;
+    const double size = g->size[i] + n * room / (1 - 2 * n), c = g->centre[i], h = g->half[i];
+    if (!(n < 0.5) || h == 0) continue;
+    const int side = (size - c) / h == end ? 1 : (-size - c) / h == end ? -1 : 0;
+    for (int k = 0; k < 6 && side; k++) {
+      const double wider =
+          part * part * room * sign * s->normal[k][i] + (best->height > 0 ? n * part * s->height[k] : 0);
+      out[k] = (side * wider - m->centre[k][i] - end * m->half[k][i]) / h;
+    }
+    if (side) return;
+  }
+}
+
+// adds those of draw to an end, whose own are by
+static void add_draw_slopes(const segment *g, const drift *m, const lowest *best, const slopes *s, double end,
+                            const double by[6], double t[6]) {
+  lowest far = {.t = end};
+  slopes there;
+  const double way = end - best->t, size = norm3(g->half), length = fabs(way) * size;
+  if (length == 0) return;
+  far.height = height_along(g, end, best->normal, far.normal);
+  const double steep = (far.height - best->height) / (length * FLAT), fraction = fmax(1 - steep * steep, 0);
+  if (fraction == 0) return;
+  for (int k = 0; k < 6; k++) there.t[k] = by[k];
+  find_slopes(g, m, &far, &there);
+  for (int k = 0; k < 6; k++) {
+    const double longer = (way < 0 ? -1 : 1) * (by[k] - s->t[k]) * size;
+    const double steeper = ((there.height[k] - s->height[k]) / FLAT - steep * longer) / length;
+    t[k] += fraction * (fraction * (by[k] - s->t[k]) - 4 * steep * steeper * way);
+  }
+}
+
+// of a contact, world, from those of its point on the box
+static void put_rates(const cav_shape *a, const cav_shape *b, const segment *g, const drift *m, const lowest *p,
+                      const slopes *s, const double point[3], const cav_touch *touch, cav_touch rate[6]) {
+  const double reach = (p->height + a->size[0]) / 2;
+  double arm[3];
+  sub3(arm, touch->pos, point);
+  for (int k = 0; k < 6; k++) {
+    const double e[3] = {k % 3 == 0, k % 3 == 1, k % 3 == 2};
+    double x[3], n[3], with[3];
+    axpy3(x, m->centre[k], s->t[k], g->half);
+    axpy3(x, x, p->t, m->half[k]);
+    axpy3(x, x, -s->height[k] / 2, p->normal);
+    axpy3(x, x, -reach, s->normal[k]);
+    rotate(x, b->rotation, x);
+    rotate(n, b->rotation, s->normal[k]);
+    // and what moves with the box
+    if (k < 3)
+      cross3(with, e, arm);
+    else
+      copy3(with, e);
+    add3(rate[k].pos, x, with);
+    zero3(with);
+    if (k < 3) cross3(with, e, touch->normal);
+    sub3(rate[k].normal, with, n);
+    zero3(rate[k].tangent);
+    rate[k].dist = s->height[k];
+    rate[k].feature = touch->feature;
+  }
+}
+
+int cav_segment_rates(const cav_shape *a, const cav_shape *b, double margin, const double point[3], cav_touch *touch,
+                      cav_touch (*rate)[6]) {
+  const segment g = segment_of(a, b);
+  const drift m = drift_of(a, b, &g, point);
+  lowest first = {.t = 0}, second;
+  slopes s = {.t = {0}}, last = {.t = {0}};
+  if (a->type == CAV_GEOM_SPHERE) {
+    first.height = g.surface(g.size, g.centre, first.normal);
+    if (!touch_at(a, b, &g, 0, first.height, first.normal, margin, 0, touch)) return 0;
+    find_slopes(&g, &m, &first, &s);
+    put_rates(a, b, &g, &m, &first, &s, point, touch, rate[0]);
+    return 1;
+  }
+  find_lowest(&g, &first);
+  if (first.height - a->size[0] >= margin) return 0;
+  if (first.height < TOUCHES * (a->size[0] + a->size[1])) return -1;
+  const lowest best = first;
+  double end[2], by[2][6];
+  if (rest_on_box(&g, a->size[0], &best, end, &first, &second) || !find_place_slopes(&g, &m, &best, s.t)) return -1;
+  find_slopes(&g, &m, &best, &s);
+  for (int k = 0; k < 6; k++) last.t[k] = s.t[k];
+  for (int k = 0; k < 2; k++) {
+    find_end_slopes(&g, &m, &best, &s, end[k], by[k]);
+    add_draw_slopes(&g, &m, &best, &s, end[k], by[k], last.t);
+  }
+  find_slopes(&g, &m, &second, &last);
+  const int late = first.t > second.t;
+  int count = touch_at(a, b, &g, first.t, first.height, first.normal, margin, late, touch);
+  if (count) put_rates(a, b, &g, &m, &first, &s, point, touch, rate[0]);
+  if (!touch_at(a, b, &g, second.t, second.height, second.normal, margin, !late, touch + count)) return count;
+  put_rates(a, b, &g, &m, &second, &last, point, touch + count, rate[count]);
+  return count + 1;
 }

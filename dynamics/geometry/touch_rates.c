@@ -1,8 +1,8 @@
-/// Contact points differenced in the six directions of a twist of the second shape against the first, for all points of a
-/// pair at once: one-sided where a point is gone on one side.
+/// Rates of contact points by the six directions of a twist of the second shape against the first, for all points of a
+/// pair at once: of capsules and spheres on boxes in closed form (segment.c); of others by differences, one-sided where a
+/// point is gone on one side.
 #include "capsules_four.h"
-#include "geometry.h"
-#include "math3.h"
+#include "pairs.h"
 #include "vectors.h"
 
 // steps: rad, and fraction of the size of the smaller shape
@@ -82,6 +82,11 @@ static int displace_capsules(cav_pair_manifolds *m, const double point[3], doubl
 static void displace(cav_pair_manifolds *m, const double point[3]) {
   const double shift = SHIFT_STEP * m->size, margin = m->margin + 4 * shift;
   copy3(m->point, point);
+  if (m->b.type == CAV_GEOM_BOX && m->a.type <= CAV_GEOM_CAPSULE && m->a.type != CAV_GEOM_PLANE) {
+    m->count[12] = cav_segment_rates(&m->a, &m->b, margin, point, m->touch[12], m->rate);
+    m->displaced = 2;
+    if (m->count[12] >= 0) return;
+  }
   // every routine keeps to CAV_TOUCH_MAX: collide.c asserts it for the same shapes
   m->count[12] = cav_collide_shapes(&m->a, &m->b, margin, m->touch[12]);
   m->displaced = 1;
@@ -121,7 +126,8 @@ int cav_touch_rates(cav_pair_manifolds *m, const double point[3], int feature, c
   const cav_touch *found = find(m->touch[12], m->count[12], feature);
   if (!found) return 0;
   *here = *found;
-  for (int k = 0; k < 6; k++) {
+  if (m->displaced == 2) memcpy(rate, m->rate[found - m->touch[12]], 6 * sizeof *rate);
+  for (int k = 0; k < 6 && m->displaced == 1; k++) {
     const double step = k < 3 ? ROTATION_STEP : SHIFT_STEP * m->size;
     const cav_touch *at[2];
     for (int side = 0; side < 2; side++) at[side] = find(m->touch[2 * k + side], m->count[2 * k + side], feature);

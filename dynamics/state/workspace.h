@@ -35,6 +35,9 @@ struct cav_half_steps;
 struct cav_next_knot;
 struct cav_derivative_store;
 
+/// Of a matrix of three rows.
+enum { CAV_LAW_NUMBERS = 9 };
+
 typedef struct cav_workspace {
   size_t bytes[CAV_MEMORY_USES], noted; ///< of the block, by part
 
@@ -54,6 +57,11 @@ typedef struct cav_workspace {
   // rooms
   int contact_room, row_room;
   struct cav_geom_cache *geom;
+
+  // -df/dv_next of contacts of up to three rows, found with their impulses [CAV_LAW_NUMBERS] each; the first number below 0:
+  // not known. Less room than contacts: none is known
+  double *law;
+  int law_room;
 
   double discrete_damping, discrete_stiffness; ///< h B and h K of every row, by the options of the last position
 

@@ -8,6 +8,8 @@
 /// with J v_next at q.
 ///
 /// What a stage may reuse depends on the options too: after a change of those that positions depend on, all is new.
+#include <stdlib.h>
+
 #include "four_states.h"
 #include "half_step.h"
 #include "math3.h"
@@ -158,7 +160,7 @@ static void contact_push(cav_state *state, const cav_contact *c, double scale) {
 
 // f of one contact: its law at g = R^-1 (v* - v_next), v* = (1 - hB) x' - hK x in the normal row or as
 // coupled rows have it
-void cav_contact_impulse(const cav_state *state, cav_contact *c, const double *coupled) {
+void cav_contact_impulse(const cav_state *state, cav_contact *c, const double *coupled, double *hessian) {
   double g[6];
   for (int k = 0; k < c->dim; k++) {
     double target = (1 - c->damping[k]) * c->velocity[k];
@@ -166,7 +168,7 @@ void cav_contact_impulse(const cav_state *state, cav_contact *c, const double *c
     if (coupled) { target = coupled[k]; }
     g[k] = (target - c->velocity_next[k] - (k == 0 ? cav_contact_excess(state, c) : 0)) / c->regulariser[k];
   }
-  cav_law_contact(state, c, g, c->impulse, NULL);
+  cav_law_contact(state, c, g, c->impulse, hessian);
 }
 
 // velocities of all contacts, those at v only if it has changed
@@ -181,6 +183,17 @@ CAV_VECTOR_BODY void contact_velocities_body(cav_state *state, const double *vel
 }
 CAV_BY_VECTORS(contact_velocities, (cav_state * state, const double *velocity_now), (state, velocity_now))
 
+// where derivatives of the laws of all contacts go, NULL if memory runs out: they are found when they are asked for then
+static double *laws_of(cav_state *state) {
+  cav_workspace *w = state->work;
+  if (state->ncontact <= w->law_room) return w->law;
+  double *larger = realloc(w->law, (size_t)w->contact_room * CAV_LAW_NUMBERS * sizeof *larger);
+  if (!larger) return NULL;
+  w->law = larger;
+  w->law_room = w->contact_room;
+  return larger;
+}
+
 // all contacts: velocities, impulses, wrenches
 static void contacts(const cav_model *model, cav_state *state, const double *velocity_now, double scale) {
   const double *coupled = state->options.coupled ? state->work->target : NULL;
@@ -188,10 +201,13 @@ static void contacts(const cav_model *model, cav_state *state, const double *vel
   if (cav_looks_ahead(&state->options)) { cav_next_contacts_find(model, state); }
   const int by_four =
       cav_lanes_pay() && !coupled && !cav_looks_ahead(&state->options) && state->options.sliding == CAV_SLIDING_CONVEX;
+  double *law = laws_of(state);
   for (int i = 0, known = 0; i < state->ncontact; i++) {
     cav_contact *c = &state->contact[i];
+    double *hessian = law ? law + CAV_LAW_NUMBERS * i : NULL;
+    if (hessian) hessian[0] = -1;
     if (i >= known && by_four && i + CAV_LANES <= state->ncontact && cav_law_four(c)) known = i + CAV_LANES;
-    if (i >= known) cav_contact_impulse(state, c, coupled);
+    if (i >= known) cav_contact_impulse(state, c, coupled, c->dim <= 3 ? hessian : NULL);
     if (coupled) { coupled += c->dim; }
     contact_push(state, c, scale);
   }

@@ -133,7 +133,7 @@ CAV_BY_FOUR static void find_singly(const scene *s, point *c) {
     for (int k = 0; k < (dim > 1 ? 9 : 3); k++) one.frame[k] = c->frame[k][lane];
     for (int k = 0; k < dim; k++) one.velocity[k] = c->now[k][lane], one.velocity_next[k] = c->next[k][lane];
     cav_contact_soften(s->state[lane], &one);
-    cav_contact_impulse(s->state[lane], &one, NULL);
+    cav_contact_impulse(s->state[lane], &one, NULL, NULL);
     for (int k = 0; k < dim; k++) c->impulse[k][lane] = one.impulse[k];
   }
 }

@@ -284,6 +284,7 @@ void cav_state_free(cav_state *state) {
   cav_hessian_free(state->work->hessian);
   free(state->work->solver);
   free(state->work->memory);
+  free(state->work->law);
   free(state->contact);
   free(state->row);
   free(state);
@@ -295,6 +296,7 @@ void cav_state_bytes(const cav_state *state, size_t bytes[CAV_MEMORY_USES]) {
   bytes[CAV_MEMORY_ROWS] += (size_t)w->row_room * sizeof *state->row;
   bytes[CAV_MEMORY_MOTION] += cav_fluid_bytes(w) + (w->half_steps ? w->half_steps->bytes : 0);
   bytes[CAV_MEMORY_CONTACTS] += cav_next_knot_bytes(w->next);
+  bytes[CAV_MEMORY_CONTACTS] += (size_t)w->law_room * CAV_LAW_NUMBERS * sizeof *w->law;
   bytes[CAV_MEMORY_CONTACTS] += (size_t)w->contact_room * sizeof *state->contact + cav_geom_cache_bytes(w->geom);
   size_t nu = (size_t)state->model->nactuator;
   bytes[CAV_MEMORY_ACTUATION] += w->gram ? 3 * nu * nu * sizeof(double) : 0;

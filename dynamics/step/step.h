@@ -15,8 +15,9 @@ void cav_coupled_targets(cav_state *state);
 /// Velocity of a contact in its frame, out [dim], from spatial velocities of links [nlink*6]. inverse.c.
 void cav_contact_velocity(const cav_state *state, const cav_contact *contact, const double *velocity, double *out);
 
-/// Impulse of a contact by its law at its velocities; coupled: v* of its rows, NULL: each has its own. inverse.c.
-void cav_contact_impulse(const cav_state *state, cav_contact *contact, const double *coupled);
+/// Impulse of a contact by its law at its velocities; coupled: v* of its rows, NULL: each has its own; hessian [dim*dim]: of the
+/// law, or NULL. inverse.c.
+void cav_contact_impulse(const cav_state *state, cav_contact *contact, const double *coupled, double *hessian);
 
 /// Wrenches of all contacts of four states into the forces of the lanes, after cav_lanes_newton_euler there; contacts
 /// are sought among the pairs that are near, and no state gets them. Plain scenes (inverse.c). lanes_contacts.c.

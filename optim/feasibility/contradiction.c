@@ -132,9 +132,9 @@ static int excludes(const cav_examination *e, const cav_term *a, const cav_term 
 static void tell_wanted(const cav_term *term, double time, char *out, size_t size) {
   double x[CAV_SENSOR_DIM_MAX] = {1};
   const int dim = term->sensor.dim;
-  if (term->use == CAV_USE_RANGE && isfinite(term->lower) && isfinite(term->upper))
+  if (term->use == CAV_USE_RANGE && !term->target && isfinite(term->lower) && isfinite(term->upper))
     snprintf(out, size, "%.4g to %.4g", term->lower, term->upper);
-  else if (term->use == CAV_USE_RANGE)
+  else if (term->use == CAV_USE_RANGE && !term->target)
     snprintf(out, size, "at %s %.4g", isinf(term->upper) ? "least" : "most",
              isinf(term->upper) ? term->lower : term->upper);
   else {

@@ -238,7 +238,7 @@ static const cav_xml_element cost = {
     "cost", 0, 1, NULL, (const cav_xml_element *const[]){&cost_style, CAV_QUANTITIES(COST_CHILD) NULL}, 0, "terms that are minimised"};
 
 #define BOUNDS                                                                                                         \
-  REAL("lower", 0, "of the term", "(open)", "least value, of postures and what has a target from that on; without either bound the value equals its target"), \
+  REAL("lower", 0, "of the term", "(open)", "least value, of postures and what has a target from that on; without either bound the value equals its target, or with within= each component stays so near it"), \
   REAL("upper", 0, "of the term", "(open)", "greatest value, likewise")
 #define HARD_ELEMENT_0(element, of, text)
 #define HARD_ELEMENT_1(element, of, text) \

@@ -475,10 +475,7 @@ static cav_status make_absolute(const cav_problem_reader *reader, const cav_xml_
                            cav_status_name(status));
   cav_sensor_read(reader->model, reader->state, &term->sensor, reading);
   int rotation = term->sensor.dim == 4;
-  if (term->use == CAV_USE_RANGE && !rotation) {
-    if (term->sensor.dim > 1 && term->component < 0) {
-      return cav_xml_fail(reader->error, node, "component", "is missing; relative bounds are of one component");
-    }
+  if (term->use == CAV_USE_RANGE && !rotation && !term->target && (term->sensor.dim == 1 || term->component >= 0)) {
     double from = reading[term->component < 0 ? 0 : term->component];
     term->lower += from;
     term->upper += from;
@@ -530,9 +527,6 @@ static cav_status read_sensor(const cav_problem_reader *reader, const cav_xml_no
                           "is missing; give %s, or relative=\"start\" or \"goal\" to count from the reading there",
                           is_direction(term) ? "a direction" : "a place in the world");
   }
-  if (!status && term->use == CAV_USE_RANGE && term->target && term->sensor.dim != 4) {
-    status = cav_xml_fail(reader->error, node, "target", "contradicts 'lower' and 'upper'; give one or the others");
-  }
   return status ? status : make_absolute(reader, node, term);
 }
 
@@ -580,6 +574,15 @@ static cav_status read_within(const cav_problem_reader *reader, const cav_xml_no
                       "expected a number above 0, in the unit of the quantity, or 'any', got '%.40s'", text);
 }
 
+// what has to equal its target within a tolerance is bounded
+static void bound_by_tolerance(cav_term *term) {
+  if (term->use != CAV_USE_EQUAL || !(term->within > 0) || isinf(term->within)) return;
+  term->use = CAV_USE_RANGE;
+  term->lower = -term->within;
+  term->upper = term->within;
+  term->within = 0;
+}
+
 // bounds of a constraint, or the weight of a cost
 static cav_status read_use(const cav_problem_reader *reader, const cav_xml_node *node, int hard, cav_term *term) {
   if (hard) term->use = cav_xml_get(node, "lower") || cav_xml_get(node, "upper") ? CAV_USE_RANGE : CAV_USE_EQUAL;
@@ -610,7 +613,11 @@ static cav_status read_term(const cav_problem_reader *reader, const cav_xml_node
   if (!term->name) return cav_problem_no_memory(reader);
   cav_status status = read_use(reader, node, hard, term);
   if (!status) status = cav_problem_window(reader, node, &term->from, &term->to);
-  if (status || quantity != CAV_QUANTITY_TRACK) return status ? status : read_values(reader, node, term);
+  if (!status && quantity != CAV_QUANTITY_TRACK) {
+    status = read_values(reader, node, term);
+    bound_by_tolerance(term);
+  }
+  if (status || quantity != CAV_QUANTITY_TRACK) return status;
   cav_term base = *term;
   return cav_problem_track(reader, node, &base, term, n);
 }

@@ -34,7 +34,7 @@ static void add_term(const cav_problem *p, const cav_term *term, cav_state *stat
   if (cav_term_placed(p->model, term) != found->link || !cav_term_asks(term)) return;
   const double to = term->to < 0 ? p->duration : fmin(term->to, p->duration);
   cav_sensor_read(p->model, state, s, at);
-  if (term->use == CAV_USE_RANGE) {
+  if (term->use == CAV_USE_RANGE && !term->target) {
     if (term->component == 2 && isfinite(term->lower)) found->rise = fmax(found->rise, term->lower - at[2]);
     return;
   }
@@ -89,7 +89,7 @@ static double joint_asked(const cav_problem *p, int joint, cav_thing *found) {
     if (term->quantity != CAV_QUANTITY_SENSOR || s->type != CAV_SENSOR_JOINTPOS || s->object != joint) continue;
     const double to = term->to < 0 ? p->duration : fmin(term->to, p->duration);
     if (!cav_term_asks(term) || to < found->time) continue;
-    if (term->use == CAV_USE_RANGE)
+    if (term->use == CAV_USE_RANGE && !term->target)
       last = fmin(fmax(start, term->lower), term->upper);
     else
       cav_term_target(term, to, 1, &last);

@@ -46,7 +46,7 @@ static int is_last(const cav_problem *p, const cav_term *term) {
 
 // whether a term says what a posture has to be at the end
 static int is_of_end(const cav_problem *p, const cav_term *term) {
-  return is_last(p, term) && term->quantity == CAV_QUANTITY_SENSOR && term->use != CAV_USE_RANGE &&
+  return is_last(p, term) && term->quantity == CAV_QUANTITY_SENSOR && (term->use != CAV_USE_RANGE || term->target) &&
          cav_term_asks(term) && cav_term_stage(term) == CAV_READS_POSITION && isfinite(cav_term_tolerance(p, term, 1));
 }
 

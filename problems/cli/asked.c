@@ -84,11 +84,12 @@ static void write_wanted(const cav_term *term, double time, char *out) {
   const cav_sensor *s = &term->sensor;
   double target[CAV_SENSOR_DIM_MAX];
   const int one = s->dim == 1 || term->component >= 0, k = s->dim == 1 ? 0 : term->component;
-  if (term->use == CAV_USE_RANGE && isinf(term->upper))
+  const int bounds = term->use == CAV_USE_RANGE && !term->target;
+  if (bounds && isinf(term->upper))
     snprintf(out, CELL, ">= %.4g", term->lower);
-  else if (term->use == CAV_USE_RANGE && isinf(term->lower))
+  else if (bounds && isinf(term->lower))
     snprintf(out, CELL, "<= %.4g", term->upper);
-  else if (term->use == CAV_USE_RANGE)
+  else if (bounds)
     snprintf(out, CELL, "%.4g .. %.4g", term->lower, term->upper);
   else if (s->dim == 4)
     snprintf(out, CELL, "0 off");

@@ -50,7 +50,8 @@ static void print_posture_bounds(const cav_problem *p, const cav_term *term) {
 
 // what a term is held against
 static void print_target(const cav_problem *p, const cav_term *term) {
-  if (term->use == CAV_USE_RANGE) {
+  const int about = term->quantity == CAV_QUANTITY_SENSOR && term->target;
+  if (term->use == CAV_USE_RANGE && !about) {
     if (isfinite(term->lower)) printf(" at least %g", term->lower);
     if (isfinite(term->upper)) printf("%s at most %g", isfinite(term->lower) ? " and" : "", term->upper);
     if (term->quantity == CAV_QUANTITY_CONFIGURATION) print_posture_bounds(p, term);
@@ -65,7 +66,7 @@ static void print_target(const cav_problem *p, const cav_term *term) {
     if (track->absent) printf(", %d markers of the set not in the file", track->absent);
   } else if (term->quantity == CAV_QUANTITY_CONFIGURATION) {
     printf(" to %s", term->target ? "its own posture" : "the goal");
-  } else if (term->quantity == CAV_QUANTITY_SENSOR && term->target) {
+  } else if (about) {
     int rotation = term->sensor.dim == 4, one = term->component >= 0 && !rotation;
     printf(" to");
     for (int i = one ? term->component : 0; i < (one ? term->component + 1 : term->sensor.dim); i++)
@@ -73,6 +74,10 @@ static void print_target(const cav_problem *p, const cav_term *term) {
   } else if (term->quantity == CAV_QUANTITY_SENSOR) {
     printf(term->sensor.dim == 4 ? " to no rotation" : " to 0");
   }
+  if (term->use == CAV_USE_RANGE && term->lower == -term->upper)
+    printf(", each component at most %.4g off", term->upper);
+  if (term->use == CAV_USE_RANGE && term->lower != -term->upper)
+    printf(", each component %.4g to %.4g off", term->lower, term->upper);
 }
 
 // whether achieved needs a term, and to what tolerance
