@@ -309,12 +309,35 @@ posture <<'TEXT'
 <goal key="stand" height="floor"><root joint="box" pos="1 0 .72"/><root joint="ball" pos="3 0 1"/></goal>
 TEXT
 inspected 0 p.xml
+says out "note: height=\"floor\" of <goal> raises 'box' by 0.08 m onto 'tabletop', inside which it begins, <goal> lowers 'ball' by 0.9 m; <root joint="
+check "it lies on the table" grep -qE "^  box .* 1.000 +0.000 +0.800$" out
+# its centre beside the table, it is not for it
+sed -i 's/pos="1 0 .72"/pos="1.45 0 .72"/' p.xml
+inspected 0 p.xml
 says out "note: height=\"floor\" of <goal> lowers 'box' by 0.62 m, not stopped by 'tabletop', inside which it begins: 0.080 m higher it is on that"
 says out "note: height=\"floor\" of <goal> lowers 'ball' by 0.9 m; <root joint="
-sed -i 's/pos="1 0 .72"/pos="1 0 .80"/' p.xml
+sed -i 's/pos="1.45 0 .72"/pos="1 0 .80"/' p.xml
 inspected 0 p.xml
 not_said "tabletop', inside"
 check "it lies on the table" grep -qE "^  box .* 1.000 +0.000 +0.800$" out
+
+# --- over a platform a body stands on that, wherever its root is stated; a box over a back is put down there ---
+
+posture <<'TEXT'
+<scene><geom name="platform" type="box" pos="0 0 .1" size=".4 .4 .1"/></scene>
+<start key="stand" height="floor"><root pos="0 0 1"/></start>
+<goal key="stand" height="floor"><root pos="0 0 1.4"/></goal>
+TEXT
+inspected 0 p.xml
+says out "start  centre of mass at 0.003 -0.000 1.164 m, touches the world with foot_right, foot_left"
+says out "goal   centre of mass at 0.003 -0.000 1.164 m, touches the world with foot_right, foot_left"
+says out "<start> raises 'torso' by 0.543 m onto 'platform', inside which it begins"
+posture <<'TEXT'
+<scene><body name="box" pos="0 0 1.6"><freejoint name="box"/><geom name="box" type="box" size=".1 .1 .05" mass="1"/></body></scene>
+<start key="stand" height="floor"/><goal key="stand" height="floor"/>
+TEXT
+inspected 0 p.xml
+check "a box over a head lies on it" grep -qE "^  start .*head touches box|^  start .*torso touches box" out
 
 # --- what touches what else than the world; what is let go falls, and a motor that is too weak is told before that ---
 

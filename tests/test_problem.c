@@ -449,6 +449,36 @@ static void check_constraints(void) {
   cav_problem_free(p);
 }
 
+// a tolerance of what has to hold is a band about the target, of a sensor as of a posture, and so it is read again
+static void check_bands(void) {
+  cav_problem *p = load(
+      HEAD
+      "<constraint>\n<sensor name='stays' type='framepos' site='eye' relative='start' target='0 0 0' within='.03'/>\n"
+      "<sensor name='near' type='framepos' site='eye' relative='start' lower='-.01' upper='.02'/>\n"
+      "<sensor name='about' type='framepos' site='eye' component='z' target='1' lower='-.01' upper='.02'/>\n"
+      "<posture name='held' dofs='all' within='.1'/>\n<velocity name='slow' joint='x' within='1'/>\n"
+      "<sensor name='exact' type='framepos' site='eye' relative='start' target='0 0 0'/>\n</constraint>\n" TAIL);
+  for (int again = 0; p && again < 2; again++) {
+    const cav_term *stays = find(p, "stays"), *near = find(p, "near"), *about = find(p, "about");
+    const cav_term *held = find(p, "held"), *slow = find(p, "slow"), *exact = find(p, "exact");
+    if (!CHECK(stays && near && about && held && slow && exact)) break;
+    CHECK(stays->use == CAV_USE_RANGE && stays->lower == -.03 && stays->upper == .03 && stays->within == 0);
+    CHECK(near->use == CAV_USE_RANGE && near->lower == -.01 && near->upper == .02);
+    CHECK(stays->target && near->target && !memcmp(stays->target, near->target, 3 * sizeof(double)));
+    if (stays->target) CHECK_NEAR(stays->target[2], 1.1, 1e-12);
+    CHECK(about->use == CAV_USE_RANGE && about->target && about->target[2] == 1 && about->lower == -.01);
+    CHECK(held->use == CAV_USE_RANGE && held->lower == -.1 && held->upper == .1);
+    CHECK(slow->use == CAV_USE_RANGE && slow->lower == -1 && slow->upper == 1);
+    CHECK(exact->use == CAV_USE_EQUAL);
+    cav_error error = {0};
+    if (again || !CHECK(cav_problem_write(copy_path, p, NULL, &error) == CAV_OK)) break;
+    cav_problem_free(p);
+    p = cav_problem_load(copy_path, NULL, &error);
+    CHECK_TEXT(error.text, "");
+  }
+  cav_problem_free(p);
+}
+
 static void check_same_stage(const cav_stage_options *a, const cav_stage_options *b) {
   CHECK(a->softness == b->softness && a->time_constant == b->time_constant && a->smoothing == b->smoothing);
   CHECK(a->smoothing_self == b->smoothing_self && a->penalty == b->penalty && a->iterations == b->iterations &&
@@ -597,6 +627,7 @@ int main(void) {
   check_costs();
   check_styles();
   check_constraints();
+  check_bands();
   check_round_trip();
   check_motions();
   const char *made[] = {"copy.xml", "motion.csv", "cart.xml", "robot.urdf", "record.csv", "ball.xml"};

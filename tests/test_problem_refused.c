@@ -243,8 +243,7 @@ static void check_broken_terms(void) {
   refuse_cost("<sensor weight='1' type='framelinvel' body='trunk' relative='goal'/>", "at rest");
   refuse_constraint("<sensor type='framepos' body='trunk' component='z' lower='2' upper='1'/>", "above 'upper'");
   refuse_constraint("<force body='trunk'/>", "what must not touch is <sensor type=\"touch\"");
-  refuse_constraint("<sensor type='framepos' body='trunk' component='z' lower='2' target='1'/>", "contradicts");
-  refuse_constraint("<sensor type='framepos' body='trunk' lower='2' relative='goal'/>", "component");
+  refuse_constraint("<sensor type='framepos' body='trunk' component='z' target='1' within='0'/>", "above 0");
   refuse_constraint("<effort upper='1'/>", "effort");
   refuse_constraint("<velocity weight='1'/>", "weight");
 }

@@ -288,10 +288,10 @@ typedef struct drift {
   double centre[6][3], half[6][3];
 } drift;
 
-/// Of a point on the box: the place along the segment, the height there and the normal.
-typedef struct slopes {
+/// Of a point over the box by each twist: of its place along the segment, the height there and the normal.
+typedef struct derivatives {
   double t[6], height[6], normal[6][3];
-} slopes;
+} derivatives;
 
 static drift drift_of(const cav_shape *a, const cav_shape *b, const segment *g, const double point[3]) {
   drift m;
@@ -325,7 +325,7 @@ static int beyond(const segment *g, const lowest *p, int out[3]) {
 }
 
 // of the height and the normal, from those of the place. Over a face the normal stays; over an edge and a corner it turns
-static void find_slopes(const segment *g, const drift *m, const lowest *p, slopes *s) {
+static void differentiate_height(const segment *g, const drift *m, const lowest *p, derivatives *s) {
   int out[3];
   const int round = beyond(g, p, out) > 1;
   for (int k = 0; k < 6; k++) {
@@ -339,7 +339,7 @@ static void find_slopes(const segment *g, const drift *m, const lowest *p, slope
 }
 
 // of the lowest place: none at an end; else where the normal over an edge or a corner stays square to the segment. 0: it jumps
-static int find_place_slopes(const segment *g, const drift *m, const lowest *p, double t[6]) {
+static int differentiate_place(const segment *g, const drift *m, const lowest *p, double t[6]) {
   static const double least = 1e-9;
   int out[3];
   for (int k = 0; k < 6; k++) t[k] = 0;
@@ -360,8 +360,8 @@ static int find_place_slopes(const segment *g, const drift *m, const lowest *p, 
 }
 
 // of an end of the part above the box (clip_box)
-static void find_end_slopes(const segment *g, const drift *m, const lowest *best, const slopes *s, double end,
-                            double out[6]) {
+static void differentiate_end(const segment *g, const drift *m, const lowest *best, const derivatives *s, double end,
+                              double out[6]) {
   const double room = norm3(g->half) + fmax(best->height, 0);
   for (int k = 0; k < 6; k++) out[k] = end == best->t ? s->t[k] : 0;
   if (end == best->t || fabs(end) == 1) return;
@@ -380,17 +380,17 @@ static void find_end_slopes(const segment *g, const drift *m, const lowest *best
 }
 
 // adds those of draw to an end, whose own are by
-static void add_draw_slopes(const segment *g, const drift *m, const lowest *best, const slopes *s, double end,
-                            const double by[6], double t[6]) {
+static void differentiate_draw(const segment *g, const drift *m, const lowest *best, const derivatives *s, double end,
+                               const double by[6], double t[6]) {
   lowest far = {.t = end};
-  slopes there;
+  derivatives there;
   const double way = end - best->t, size = norm3(g->half), length = fabs(way) * size;
   if (length == 0) return;
   far.height = height_along(g, end, best->normal, far.normal);
   const double steep = (far.height - best->height) / (length * FLAT), fraction = fmax(1 - steep * steep, 0);
   if (fraction == 0) return;
   for (int k = 0; k < 6; k++) there.t[k] = by[k];
-  find_slopes(g, m, &far, &there);
+  differentiate_height(g, m, &far, &there);
   for (int k = 0; k < 6; k++) {
     const double longer = (way < 0 ? -1 : 1) * (by[k] - s->t[k]) * size;
     const double steeper = ((there.height[k] - s->height[k]) / FLAT - steep * longer) / length;
@@ -400,7 +400,7 @@ static void add_draw_slopes(const segment *g, const drift *m, const lowest *best
 
 // of a contact, world, from those of its point on the box
 static void put_rates(const cav_shape *a, const cav_shape *b, const segment *g, const drift *m, const lowest *p,
-                      const slopes *s, const double point[3], const cav_touch *touch, cav_touch rate[6]) {
+                      const derivatives *s, const double point[3], const cav_touch *touch, cav_touch rate[6]) {
   const double reach = (p->height + a->size[0]) / 2;
   double arm[3];
   sub3(arm, touch->pos, point);
@@ -433,11 +433,11 @@ int cav_segment_rates(const cav_shape *a, const cav_shape *b, double margin, con
   const segment g = segment_of(a, b);
   const drift m = drift_of(a, b, &g, point);
   lowest first = {.t = 0}, second;
-  slopes s = {.t = {0}}, last = {.t = {0}};
+  derivatives s = {.t = {0}}, last = {.t = {0}};
   if (a->type == CAV_GEOM_SPHERE) {
     first.height = g.surface(g.size, g.centre, first.normal);
     if (!touch_at(a, b, &g, 0, first.height, first.normal, margin, 0, touch)) return 0;
-    find_slopes(&g, &m, &first, &s);
+    differentiate_height(&g, &m, &first, &s);
     put_rates(a, b, &g, &m, &first, &s, point, touch, rate[0]);
     return 1;
   }
@@ -446,14 +446,14 @@ int cav_segment_rates(const cav_shape *a, const cav_shape *b, double margin, con
   if (first.height < TOUCHES * (a->size[0] + a->size[1])) return -1;
   const lowest best = first;
   double end[2], by[2][6];
-  if (rest_on_box(&g, a->size[0], &best, end, &first, &second) || !find_place_slopes(&g, &m, &best, s.t)) return -1;
-  find_slopes(&g, &m, &best, &s);
+  if (rest_on_box(&g, a->size[0], &best, end, &first, &second) || !differentiate_place(&g, &m, &best, s.t)) return -1;
+  differentiate_height(&g, &m, &best, &s);
   for (int k = 0; k < 6; k++) last.t[k] = s.t[k];
   for (int k = 0; k < 2; k++) {
-    find_end_slopes(&g, &m, &best, &s, end[k], by[k]);
-    add_draw_slopes(&g, &m, &best, &s, end[k], by[k], last.t);
+    differentiate_end(&g, &m, &best, &s, end[k], by[k]);
+    differentiate_draw(&g, &m, &best, &s, end[k], by[k], last.t);
   }
-  find_slopes(&g, &m, &second, &last);
+  differentiate_height(&g, &m, &second, &last);
   const int late = first.t > second.t;
   int count = touch_at(a, b, &g, first.t, first.height, first.normal, margin, late, touch);
   if (count) put_rates(a, b, &g, &m, &first, &s, point, touch, rate[0]);

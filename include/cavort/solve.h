@@ -551,8 +551,8 @@ CAV_API cav_status cav_verify(const cav_problem *problem, const cav_trajectory *
 CAV_API cav_status cav_verify_knots(const cav_problem *problem, const cav_trajectory *trajectory,
                                     const cav_options *contact, cav_verdict *verdict, cav_error *error);
 
-/// The verdict of cav_verify on a solution, sooner: closed loops that verification has run for the choice of its gains are not run again where
-/// motion, law and gains are those of then, to the bit. The model has to be unchanged since the solve.
+/// The verdict of cav_verify on a solution, sooner: closed loops that verification has run for the choice of its gains are
+/// not run again where motion, law and gains are those of then, to the bit. The model has to be unchanged since the solve.
 CAV_API cav_status cav_verify_solution(const cav_problem *problem, const cav_solution *solution, cav_verdict *verdict,
                                        cav_error *error);
 

@@ -105,7 +105,7 @@ static void examine_posture(cav_examination *e, const cav_state *state, const ch
   // what stands is named last
   int stands = m->geom[pair->geom2].link == 0 ? pair->geom2 : pair->geom1;
   int moves = stands == pair->geom1 ? pair->geom2 : pair->geom1;
-  // height='floor' lifts onto planes, and lowers onto whatever is below: out of another solid it lifts nothing
+  // height='floor' lifts onto planes, and onto a solid that the body's centre is over
   const cav_link *root = &m->link[m->link[m->geom[moves].link].root];
   int floats = root->njoint && m->joint[root->joint].type == CAV_JOINT_FREE, fixed = m->geom[stands].link == 0;
   const char *cure = "Change the posture, or move the solid; cavort inspect shows its depths.";
@@ -113,8 +113,8 @@ static void examine_posture(cav_examination *e, const cav_state *state, const ch
     cure = "Change the posture; height='floor' lifts it onto a floor, cavort inspect shows its depths.";
   else if (fixed && floats)
     cure =
-        "Change the posture: to stand on that, rise='H' (its top over the floor) beside height='floor', or "
-        "<root pos='X Y Z'/> with Z above it.";
+        "Change the posture: to stand on that, height='floor' with its centre over it, or <root pos='X Y Z'/> with Z "
+        "above it.";
   cav_impossible(e, CAV_CONDITION_SOLID, NULL, cure,
                  "%s: geom '%.100s' is %.3g mm inside '%.100s', and a certificate allows %g", which,
                  cav_geom_words(m, moves, one), -1e3 * deepest->dist, cav_geom_words(m, stands, other),

@@ -1,7 +1,8 @@
 /// A posture down to the floor: each tree of a model along its root until its lowest geom touches a plane of the world, or,
-/// going down, something else that stands in the world: a box on a table stays on the table. With a rise the planes alone
-/// count. The distance of a geom from a plane is by its support point, exact for every type here. And a posture within the
-/// ranges of its joints. Postures of files go the same way (pose.c).
+/// going down, something else that stands in the world: a box on a table stays on the table, and one over a robot's back
+/// comes to rest there. What begins inside a solid, its centre of mass over that, is raised onto it. With a rise the planes
+/// alone count. The distance of a geom from a plane is by its support point, exact for every type here. And a posture within
+/// the ranges of its joints. Postures of files go the same way (pose.c).
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -46,7 +47,16 @@ static double way_to_plane(const cav_model *m, const cav_state *state, int root)
   return up;
 }
 
-// the geom that stands in the world, is no plane and has a tree deepest and deeper than that inside it; -1: there is none
+// m: what lies on something may be so deep in it
+static const double rounding = 1e-6;
+
+// whether a geom stands where a tree comes down: in the world, and for what no actuator moves on who is driven
+static int stands_under(const cav_model *m, int geom, int root) {
+  const int other = m->link[m->geom[geom].link].root;
+  return other == 0 || (other != root && !m->link[root].driven && m->link[other].driven);
+}
+
+// the geom that stands there, is no plane and has a tree deepest and deeper than that inside it; -1: there is none
 static cav_status solid_around(const cav_model *m, cav_state *state, int root, const double *q, double depth,
                                int *solid) {
   cav_status status = cav_position(m, state, q);
@@ -54,10 +64,13 @@ static cav_status solid_around(const cav_model *m, cav_state *state, int root, c
   *solid = -1;
   for (int i = 0; i < state->ncontact && !status; i++) {
     const cav_pair *pair = &m->pair[state->contact[i].pair];
-    const int stands = m->geom[pair->geom1].link == 0 ? pair->geom1 : pair->geom2,
-              moves = stands == pair->geom1 ? pair->geom2 : pair->geom1;
-    if (m->geom[stands].link != 0 || m->geom[stands].type == CAV_GEOM_PLANE) continue;
-    if (m->link[m->geom[moves].link].root != root || !(-state->contact[i].dist > most)) continue;
+    const int moves = m->link[m->geom[pair->geom1].link].root == root ? pair->geom1 : pair->geom2,
+              stands = moves == pair->geom1 ? pair->geom2 : pair->geom1;
+    if (m->link[m->geom[moves].link].root != root || m->geom[stands].type == CAV_GEOM_PLANE) continue;
+    if (!stands_under(m, stands, root)) continue;
+    // beside who is driven it slips by
+    const double depth_here = -state->contact[i].dist - (m->geom[stands].link == 0 ? 0 : rounding);
+    if (!(depth_here > most)) continue;
     most = -state->contact[i].dist;
     *solid = stands;
   }
@@ -79,7 +92,7 @@ static cav_status bisect(const cav_model *m, cav_state *state, int root, int hei
 }
 
 static const double search_step = 0.005; // m: thinner things are passed
-static const double rounding = 1e-6;     // m: what lies on something may be so deep in it
+static const double highest_step = 1;    // m: onto what is higher nothing is raised
 
 // how far a tree can go down, at most that far, before it touches something: step by step, then by bisection
 static cav_status way_down(const cav_model *m, cav_state *state, int root, int height, double gain, double most,
@@ -124,13 +137,50 @@ cav_status cav_tree_buried(const cav_model *m, cav_state *state, int root, doubl
   return status;
 }
 
+// whether a tree's centre of mass is over a geom, between the ends that this has along x and y
+static int is_over(const cav_model *m, const cav_state *state, int root, int geom) {
+  double centre[3] = {0}, mass = 0;
+  cav_pose pose;
+  for (int l = root; l < m->nlink; l++) {
+    if (m->link[l].root != root) continue;
+    for (int k = 0; k < 3; k++) centre[k] += m->link[l].mass * state->com[3 * l + k];
+    mass += m->link[l].mass;
+  }
+  cav_object_pose(m, state, CAV_OBJECT_GEOM, geom, &pose);
+  for (int k = 0; k < 4; k++) {
+    const double sign = k % 2 ? 1 : -1, n[3] = {k < 2 ? sign : 0, k < 2 ? 0 : sign, 0};
+    if (sign * (centre[k / 2] / mass - pose.pos[k / 2]) > cav_geom_reach(m, geom, &pose, n)) return 0;
+  }
+  return mass > 0;
+}
+
+// raises a tree that begins inside a solid of the world and is over it onto that; *raised 0 where it is not so
+static cav_status raise_onto(const cav_model *m, cav_state *state, int root, int height, double gain, double *q,
+                             int *raised) {
+  double up = 0;
+  int solid;
+  cav_status status = cav_tree_buried(m, state, root, q, &solid, &up);
+  *raised = 0;
+  if (status || solid < 0 || !(up > 0 && up <= highest_step)) return status;
+  status = cav_position(m, state, q);
+  if (status || !is_over(m, state, root, solid)) return status;
+  q[height] += up / gain;
+  *raised = 1;
+  return CAV_OK;
+}
+
 // moves one tree along its root to what it stands on, and higher by rise; *moved 0 where there is nothing
 static cav_status drop_tree(const cav_model *m, cav_state *state, int root, int planes_alone, double rise, double *q,
                             int *moved) {
   double gain = 1, up = way_to_plane(m, state, root), down;
   int height = lifting(m, state, root, &gain);
+  int raised = 0;
   *moved = height >= 0 && !isinf(up);
   if (!*moved) return CAV_OK;
+  if (!planes_alone) {
+    cav_status status = raise_onto(m, state, root, height, gain, q, &raised);
+    if (status || raised) return status;
+  }
   if (up < 0 && !planes_alone) {
     cav_status status = way_down(m, state, root, height, gain, -up, q, &down);
     if (status) return status;

@@ -95,8 +95,8 @@ static const cav_xml_element start_joint = {
   REALS("qpos", 1, 0, "rad or m", "(the model's own configuration)", "all nq coordinates to begin with, in MuJoCo's layout"), \
   TEXT("file", "(the model's own configuration)", "trajectory.csv to take a knot of, relative to this file"),          \
   WORD("knot", ends, "last", "knot of that file"),                                                                     \
-  WORD("height", heights, "keep", "floor: each tree that is free or slides upright is raised or lowered until it stands"), \
-  REAL("rise", 0, "m", "(0; what stands in the way down stops it, unless it begins inside that)", "with height=\"floor\": so far above the plane, whatever lies between"), \
+  WORD("height", heights, "keep", "floor: each tree that is free or slides upright is raised or lowered until it stands: on a plane, on what stands in the way down, or on the solid that its centre begins over and it inside; a thing on a robot, too"), \
+  REAL("rise", 0, "m", "(0; see height)", "with height=\"floor\": so far above the plane, whatever lies between"), \
   WORD("ranges", clippings, "keep", "clip: joints are brought into their ranges first, and tendons")
 static const cav_xml_element start = {
     "start", 1, 1,

@@ -329,6 +329,23 @@ static void add_text(char *text, size_t room, const char *format, ...) {
   va_end(args);
 }
 
+// what a posture of that element raised out of a solid that it began inside
+static cav_status note_raised(const cav_problem_reader *reader, const cav_xml_node *node, const cav_joint *joint,
+                              double way, double *before) {
+  static const double told = 0.002; // m
+  const cav_model *m = reader->model;
+  char label[CAV_WORDS];
+  double up;
+  int solid;
+  if (!(way > told) || cav_xml_get(node, "rise")) return CAV_OK;
+  cav_status status = cav_tree_buried(m, reader->state, joint->link, before, &solid, &up);
+  if (!status && solid >= 0 && fabs(up - way) < told)
+    add_text(reader->owner->lowered, sizeof reader->owner->lowered,
+             "<%s> raises '%.60s' by %.3g m onto '%.100s', inside which it begins", node->rule->name,
+             m->body[m->link[joint->link].body].name, way, cav_geom_words(m, solid, label));
+  return status;
+}
+
 // bodies without joints that a posture of that element brought down by more than they are put down: a ball that was meant to fly,
 // or a box that begins inside a table, which is not stopped by it. before is as it was in the end
 static cav_status note_lowered(const cav_problem_reader *reader, const cav_xml_node *node, double *before,
@@ -342,6 +359,8 @@ static cav_status note_lowered(const cav_problem_reader *reader, const cav_xml_n
     if (joint->type != CAV_JOINT_FREE) continue;
     double way = before[joint->q + 2] - q[joint->q + 2], up;
     int links = 0, solid;
+    status = note_raised(reader, node, joint, -way, before);
+    if (status) break;
     for (int i = 1; i < m->nlink; i++) links += m->link[i].root == joint->link;
     if (links != 1 || !(way > put_down)) continue;
     const char *name = m->body[m->link[joint->link].body].name;

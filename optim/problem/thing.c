@@ -79,20 +79,29 @@ static cav_status way_to(const cav_problem *p, const double *q, cav_state *state
   return CAV_OK;
 }
 
+/// What a term of a joint alone, its sensor or its posture, asks of it at a time; 0: it is of something else.
+static int asks_of_joint(const cav_problem *p, const cav_term *term, int joint, double time, double *target) {
+  const cav_joint *j = &p->model->joint[joint];
+  if (term->quantity == CAV_QUANTITY_SENSOR && term->sensor.type == CAV_SENSOR_JOINTPOS &&
+      term->sensor.object == joint) {
+    cav_term_target(term, time, 1, target);
+    return 1;
+  }
+  if (term->quantity != CAV_QUANTITY_CONFIGURATION || term->dofs != CAV_DOFS_ONE || term->joint != joint) return 0;
+  *target = (term->target && !term->nwaypoint ? term->target : p->q_goal)[j->q];
+  return !term->nwaypoint;
+}
+
 /// Where terms ask for a joint last, the start's where none does.
 static double joint_asked(const cav_problem *p, int joint, cav_thing *found) {
   const double start = p->q_start[p->model->joint[joint].q];
-  double last = start;
+  double last = start, target;
   for (int i = 0; i < p->nterm; i++) {
     const cav_term *term = &p->term[i];
-    const cav_sensor *s = &term->sensor;
-    if (term->quantity != CAV_QUANTITY_SENSOR || s->type != CAV_SENSOR_JOINTPOS || s->object != joint) continue;
     const double to = term->to < 0 ? p->duration : fmin(term->to, p->duration);
-    if (!cav_term_asks(term) || to < found->time) continue;
-    if (term->use == CAV_USE_RANGE && !term->target)
-      last = fmin(fmax(start, term->lower), term->upper);
-    else
-      cav_term_target(term, to, 1, &last);
+    if (!asks_of_joint(p, term, joint, to, &target) || !cav_term_asks(term) || to < found->time) continue;
+    const int bounds = term->use == CAV_USE_RANGE && term->quantity == CAV_QUANTITY_SENSOR && !term->target;
+    last = bounds ? fmin(fmax(start, term->lower), term->upper) : target;
     found->time = to, found->first = fmin(found->first, fmin(fmax(term->from, 0), to));
   }
   return last;
