@@ -142,7 +142,8 @@ static const cav_xml_element pose = {
   DOFS, TABLE, REALS("target", 1, 0, "of the term", "(0)", "wanted rate: one number, or one for each selected dof")
 #define POSTURE_ATTRIBUTES                                                                                             \
   DOFS, TABLE, TEXT("key", "(the goal)", "wanted posture: keyframe of the model or <pose> of this file"),              \
-  REALS("qpos", 1, 0, "rad or m", "(the goal)", "wanted posture: all nq coordinates, or of one hinge or slide its number")
+  REALS("qpos", 1, 0, "rad or m", "(the goal)", "wanted posture: all nq coordinates, or of one hinge or slide its number"), \
+  REALS("degrees", 1, 1, "degrees", "(the goal)", "wanted angle of the one hinge that joint= names")
 #define ONE_OBJECT "(give exactly one of body, xbody, geom, site, joint, tendon, actuator)"
 #define SENSOR_SOURCE                                                                                              \
   WORD("type", sensors, "(the sensor of the model by that name)", "what is read, by MJCF's names"),                    \
@@ -160,11 +161,13 @@ static const cav_xml_element pose = {
         "(0; the unit quaternion; none for places in the world and directions unless relative)",                       \
         "wanted reading: all values, or that of the component"),                                                       \
   WORD("relative", relations, "none", "the target is counted from the reading at the start or the goal posture")
+#define ONE_POSTURE "(give exactly one of key, qpos, degrees)"
 static const cav_xml_element posture_waypoint = {
     "waypoint", 0, 0,
     ATTRIBUTES(
-        REAL("time", 1, "s", NULL, "when"), TEXT("key", "(qpos)", "posture wanted then: a keyframe or a <pose>"),
-        REALS("qpos", 1, 0, "rad or m", "(key)", "posture wanted then, as numbers")),
+        REAL("time", 1, "s", NULL, "when"), TEXT("key", ONE_POSTURE, "posture wanted then: a keyframe or a <pose>"),
+        REALS("qpos", 1, 0, "rad or m", ONE_POSTURE, "posture wanted then, as numbers"),
+        REALS("degrees", 1, 1, "degrees", ONE_POSTURE, "angle of the one hinge wanted then")),
     NULL, 0, "target of a <posture> at a time, linear between such times"};
 static const cav_xml_element value_waypoint = {
     "waypoint", 0, 0,

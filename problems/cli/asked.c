@@ -270,8 +270,9 @@ static int tell_degrees(FILE *out, const cav_problem *p, const cav_term *term) {
   const cav_joint *joint = &m->joint[sensor ? term->sensor.object : term->joint];
   const double wanted = joint->type == CAV_JOINT_HINGE ? term->target[sensor ? 0 : joint->q] : 0;
   if (!(fabs(wanted) > many_turns)) return 0;
-  fprintf(out, "note: %s wants joint '%.60s' at %g rad, %.3g turns: targets are in radians; %g degrees are %.4g\n",
-          called(p, term, name), joint->name, wanted, fabs(wanted) / (2 * M_PI), wanted, wanted * M_PI / 180);
+  fprintf(out, "note: %s wants joint '%.60s' at %g rad, %.3g turns: %s; %g degrees are %.4g\n", called(p, term, name),
+          joint->name, wanted, fabs(wanted) / (2 * M_PI),
+          posture ? "qpos is in radians, degrees= is not" : "targets are in radians", wanted, wanted * M_PI / 180);
   return 1;
 }
 
