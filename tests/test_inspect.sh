@@ -106,6 +106,24 @@ not_said "not known of a posture"
 # targets without digits that are rounding
 asked '<sensor name="aside" type="framepos" body="box" component="y" target="-1e-18" at="end" weight="9"/>'
 says out "'aside': framepos of box, y to 0 at 1 s"
+# postures of one joint and targets along waypoints by their values, in words and in the table
+asked '<posture name="bent" joint="pivot" degrees="90" at="end" weight="9"/><velocity joint="pivot" target="2" at=".5" weight="9"/>
+<posture name="swings" joint="pivot" weight="9" within=".1"><waypoint time="0" qpos="0"/><waypoint time="1" degrees="30"/></posture>
+<posture name="moved" weight="9" within=".1" dofs="all"><waypoint time="0" qpos="0 2 0 .1 1 0 0 0"/><waypoint time="1" qpos="0 3 0 .1 1 0 0 0"/></posture>
+<sensor name="across" type="framepos" body="box" component="y" from=".5" weight="9" within=".1"><waypoint time="0" target="-.15"/>
+<waypoint time="1" target=".15"/></sensor>
+<sensor name="by" type="framepos" body="box" weight="9" within=".1"><waypoint time="0" target="2 0 1"/><waypoint time="1" target="2 1 1"/></sensor>'
+says out "'bent': posture of joint pivot to 1.571 rad (90 degrees) at 1 s;"
+says out "velocity of joint pivot to 2 at 0.5 s;"
+says out "'swings': posture of joint pivot to 0 rad (0 degrees) .. 0.5236 rad (30 degrees) along 2 waypoints;"
+says out "'moved': posture of all dofs along 2 waypoints;"
+says out "'across': framepos of box, y to -0.15 .. 0.15 along 2 waypoints from 0.5 to 1 s;"
+says out "'by': framepos of box to 2 0 1 .. 2 1 1 along 2 waypoints;"
+row "'bent', rad" 0 0 1.571
+row "'swings', rad" 0 0 "from 0 to 0.5236"
+row "'moved', farthest box x, m" 2 2 "from 2 to 3"
+row "'across' y, m" 0 0 "from 0 to 0.15"
+row "'by', m" "2 0 0.1" "2 0 0.1" "from 2 0 1 to 2 1 1"
 # whom running costs are for, and the defaults of all joints in whose place costs of one are
 asked '<velocity joint="pivot" weight="1"/><force body="box" weight="100"/><posture dofs="root_linear" weight="10"/><impact name="soft" body="box" weight="3"/>'
 check "whom a running cost is for" sh -c 'tr -s " \n" " " <out | grep -qF "velocity of pivot 1, force of box 100, posture of root_linear 10, soft 3 note"'
