@@ -63,7 +63,7 @@ says out "  -: not known of a posture: forces, and velocities but those of <star
 row "'level', rad" "0 off" "0 off" "0 off"
 row "'hint', m" "0 0 1.5" "0 0 1.5" "0 0 1.5"
 not_said "an evaluation of the inverse"
-says out "--all: joints, places of bodies"
+says out "--all: joints, places of bodies, where surfaces end"
 check "the verdict is the last line" [ "$(tail -n 1 out)" = "nothing proves it impossible: cavort solve terms.xml" ]
 brief model.xml
 check "of a model what it holds" grep -q "^pivot  *hinge" out
@@ -273,6 +273,32 @@ inspected 0 turned.xml
 joint knee_right "foot_right forwards"
 check "the comment of new has it" sh -c '"$1" new "$2" -o written.xml -q && grep -q "knee_right .* degrees; + foot_right forwards" written.xml' \
   sh "$cavort" "$root/problems/models/humanoid.xml"
+
+# --- where surfaces end: of roles, of things where the start has them, of geoms of the world; what no surface is and planes are left out ---
+
+# surface NAME LOW HIGH LOW HIGH LOW HIGH [WHAT]: of the table
+surface() {
+  check "surface: $*, not '$(sed -n '/^surfaces/,/^$/p' out | grep "^  $1 ")'" \
+    grep -qxE "  $1 +$2 \.\. +$3 +$4 \.\. +$5 +$6 \.\. +$7${8:+ +$8}" out
+}
+cat >surfaces.xml <<TEXT
+<problem name="surfaces" model="$root/problems/models/humanoid.xml"><scene><geom name="bar" type="capsule" fromto="1 -.5 .3 1 .5 .3" size=".05"/>
+<geom name="seen" type="box" pos="4 0 0" size=".1 .1 .1" contype="0" conaffinity="0"/>
+<body name="wall" pos="0 -2 1"><geom type="box" size="1 .1 1"/></body><body name="box" pos="2 0 .1"><freejoint name="box"/>
+<geom type="box" size=".3 .2 .1"/><body name="lid" pos="0 0 .2"><geom type="box" size=".1 .1 .1"/></body></body></scene>
+<horizon duration="1"/><start key="stand" height="floor"><root joint="box" pos="3 0 .1" euler="0 0 90"/></start><cost/></problem>
+TEXT
+inspected 0 surfaces.xml
+surface "right foot" "[-0-9.]+" "[-0-9.]+" "-[0-9.]+" "-[0-9.]+" 0.000 "0.0[0-9]+" foot_right
+surface "left foot" "[-0-9.]+" "[-0-9.]+" "0.[0-9]+" "0.[0-9]+" 0.000 "0.0[0-9]+" foot_left
+surface bar 0.950 1.050 -0.550 0.550 0.250 0.350 "geom of the world"
+surface wall -1.000 1.000 -2.100 -1.900 0.000 2.000 "fixed to the world"
+surface box 2.800 3.200 -0.300 0.300 0.000 0.400
+sed -n '/^surfaces/,/^$/p' out >surfaces.txt
+check "no more than these" sh -c '! grep -qE "^  (seen|lid|floor|thigh_right) " surfaces.txt'
+inspected 0 model.xml
+check "of a model at the posture of its file" grep -q "^surfaces, m  *least and greatest x, y, z in the world at the posture of the file" out
+surface box 1.900 2.100 -0.100 0.100 0.000 0.200
 
 # --- postures: what touches, what is in what ---
 
