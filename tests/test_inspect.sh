@@ -63,7 +63,7 @@ says out "  -: not known of a posture: forces, and velocities but those of <star
 row "'level', rad" "0 off" "0 off" "0 off"
 row "'hint', m" "0 0 1.5" "0 0 1.5" "0 0 1.5"
 not_said "an evaluation of the inverse"
-says out "--all: joints, places of bodies"
+says out "--all: joints, places of bodies, where surfaces end"
 check "the verdict is the last line" [ "$(tail -n 1 out)" = "nothing proves it impossible: cavort solve terms.xml" ]
 brief model.xml
 check "of a model what it holds" grep -q "^pivot  *hinge" out
@@ -106,6 +106,27 @@ not_said "not known of a posture"
 # targets without digits that are rounding
 asked '<sensor name="aside" type="framepos" body="box" component="y" target="-1e-18" at="end" weight="9"/>'
 says out "'aside': framepos of box, y to 0 at 1 s"
+# postures of one joint and targets along waypoints by their values, in words and in the table
+asked '<posture name="bent" joint="pivot" degrees="90" at="end" weight="9"/>
+<velocity joint="pivot" target="2" at=".5" weight="9"/>
+<posture name="swings" joint="pivot" weight="9" within=".1"><waypoint time="0" qpos="0"/><waypoint time="1" degrees="30"/></posture>
+<posture name="moved" weight="9" within=".1" dofs="all"><waypoint time="0" qpos="0 2 0 .1 1 0 0 0"/>
+<waypoint time="1" qpos="0 3 0 .1 1 0 0 0"/></posture>
+<sensor name="across" type="framepos" body="box" component="y" from=".5" weight="9" within=".1"><waypoint time="0" target="-.15"/>
+<waypoint time="1" target=".15"/></sensor>
+<sensor name="by" type="framepos" body="box" weight="9" within=".1"><waypoint time="0" target="2 0 1"/>
+<waypoint time="1" target="2 1 1"/></sensor>'
+says out "'bent': posture of joint pivot to 1.571 rad (90 degrees) at 1 s;"
+says out "velocity of joint pivot to 2 at 0.5 s;"
+says out "'swings': posture of joint pivot to 0 rad (0 degrees) .. 0.5236 rad (30 degrees) along 2 waypoints;"
+says out "'moved': posture of all dofs along 2 waypoints;"
+says out "'across': framepos of box, y to -0.15 .. 0.15 along 2 waypoints from 0.5 to 1 s;"
+says out "'by': framepos of box to 2 0 1 .. 2 1 1 along 2 waypoints;"
+row "'bent', rad" 0 0 1.571
+row "'swings', rad" 0 0 "from 0 to 0.5236"
+row "'moved', farthest box x, m" 2 2 "from 2 to 3"
+row "'across' y, m" 0 0 "from 0 to 0.15"
+row "'by', m" "2 0 0.1" "2 0 0.1" "from 2 0 1 to 2 1 1"
 # whom running costs are for, and the defaults of all joints in whose place costs of one are
 asked '<velocity joint="pivot" weight="1"/><force body="box" weight="100"/><posture dofs="root_linear" weight="10"/><impact name="soft" body="box" weight="3"/>'
 check "whom a running cost is for" sh -c 'tr -s " \n" " " <out | grep -qF "velocity of pivot 1, force of box 100, posture of root_linear 10, soft 3 note"'
@@ -255,6 +276,32 @@ inspected 0 turned.xml
 joint knee_right "foot_right forwards"
 check "the comment of new has it" sh -c '"$1" new "$2" -o written.xml -q && grep -q "knee_right .* degrees; + foot_right forwards" written.xml' \
   sh "$cavort" "$root/problems/models/humanoid.xml"
+
+# --- where surfaces end: of roles, of things where the start has them, of geoms of the world ---
+
+# surface NAME LOW HIGH LOW HIGH LOW HIGH [WHAT]: of the table
+surface() {
+  check "surface: $*, not '$(sed -n '/^surfaces/,/^$/p' out | grep "^  $1 ")'" \
+    grep -qxE "  $1 +$2 \.\. +$3 +$4 \.\. +$5 +$6 \.\. +$7${8:+ +$8}" out
+}
+cat >surfaces.xml <<TEXT
+<problem name="surfaces" model="$root/problems/models/humanoid.xml"><scene>
+<geom name="bar" type="capsule" fromto="1 -.5 .3 1 .5 .3" size=".05"/><geom name="seen" type="box" pos="4 0 0" size=".1 .1 .1" contype="0" conaffinity="0"/>
+<body name="wall" pos="0 -2 1"><geom type="box" size="1 .1 1"/></body><body name="box" pos="2 0 .1"><freejoint name="box"/>
+<geom type="box" size=".3 .2 .1"/><body name="lid" pos="0 0 .2"><geom type="box" size=".1 .1 .1"/></body></body></scene>
+<horizon duration="1"/><start key="stand" height="floor"><root joint="box" pos="3 0 .1" euler="0 0 90"/></start><cost/></problem>
+TEXT
+inspected 0 surfaces.xml
+surface "right foot" "[-0-9.]+" "[-0-9.]+" "-[0-9.]+" "-[0-9.]+" 0.000 "0.0[0-9]+" foot_right
+surface "left foot" "[-0-9.]+" "[-0-9.]+" "0.[0-9]+" "0.[0-9]+" 0.000 "0.0[0-9]+" foot_left
+surface bar 0.950 1.050 -0.550 0.550 0.250 0.350 "geom of the world"
+surface wall -1.000 1.000 -2.100 -1.900 0.000 2.000 "fixed to the world"
+surface box 2.800 3.200 -0.300 0.300 0.000 0.400
+sed -n '/^surfaces/,/^$/p' out >surfaces.txt
+check "no more than these" sh -c '! grep -qE "^  (seen|lid|floor|thigh_right) " surfaces.txt'
+inspected 0 model.xml
+check "of a model at the posture of its file" grep -q "^surfaces, m  *least .* at the posture of the file, of what can touch" out
+surface box 1.900 2.100 -0.100 0.100 0.000 0.200
 
 # --- postures: what touches, what is in what ---
 

@@ -101,6 +101,14 @@ check "what begins inside a solid is not stopped by it" says rise "what stands i
 check "principal axes of a body" says body "along its principal axes of inertia, which may be turned from its own"
 check "who has a tolerance" says within "attribute within of <sensor> <posture> <velocity> <acceleration> <effort> <power>"
 
+check "the convention of axes" says pos "z is up, of most robots +x forwards and +y to the left"
+check "which way angles count" says euler "about x, then the new y, then the new z, each right-handed: 0 0 90 is turned to the left"
+check "usual weights" says weight "goals usually take 500 to 5000, costs over the motion 0.01 to 10"
+check "what all constraints have" says constraint "within, lower, upper"
+check "what MJCF has in a scene is not told" says scene "holds <geom>"
+check "what is expected is within or a constraint" says expect "<constraint>, with lower=, upper= or within="
+check "joints over a named posture" says key "<joint> and <root> inside lie over it"
+
 # --- the schema ---
 
 if command -v xmllint >/dev/null 2>&1; then

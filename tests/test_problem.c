@@ -282,6 +282,25 @@ static void check_one_joint(void) {
   cav_problem_free(p);
 }
 
+// an angle in degrees is the one in radians, of a cost, a constraint and a waypoint; the rest is the goal's posture
+static void check_degrees(void) {
+  cav_problem *p = load(HEAD
+                        "<goal key='bent'/><cost><posture name='soft' joint='knee' degrees='-30' weight='1'/>"
+                        "<posture name='way' joint='knee' weight='1'><waypoint time='0' degrees='-6'/>"
+                        "<waypoint time='1' qpos='-.9'/></posture></cost>\n"
+                        "<constraint><posture name='hard' joint='pitch' degrees='90' at='end'/></constraint>\n" TAIL);
+  if (!p) return;
+  const cav_term *soft = find(p, "soft"), *way = find(p, "way"), *hard = find(p, "hard");
+  double wanted[4];
+  memcpy(wanted, p->q_goal, sizeof wanted);
+  wanted[3] = -M_PI / 6;
+  CHECK(soft && way && hard && way->nwaypoint == 2 && way->target[7] == -.9);
+  if (soft) CHECK_NEAR_ALL(soft->target, wanted, 4, 1e-15);
+  if (way) CHECK_NEAR(way->target[3], -M_PI / 30, 1e-15);
+  if (hard) CHECK_NEAR(hard->target[2], M_PI / 2, 1e-15);
+  cav_problem_free(p);
+}
+
 // bodies and geoms that the file puts into the model's world, after the model's own
 static void check_scene(void) {
   cav_problem *p =
@@ -623,6 +642,7 @@ int main(void) {
   check_scene();
   check_table();
   check_one_joint();
+  check_degrees();
   check_trajectory_ends();
   check_costs();
   check_styles();

@@ -183,6 +183,16 @@ static void check_broken_terms(void) {
   refuse_cost("<posture joint='knee' qpos='1 2' weight='1'/>",
               "expected 4 numbers for the model 'leg', or one for the joint");
   refuse_cost("<posture qpos='1' weight='1'/>", "expected 4 numbers for the model 'leg', got 1");
+  refuse_cost("<posture degrees='30' weight='1'/>", "is the angle of one hinge; name it by 'joint' of <posture>");
+  refuse_cost("<posture dofs='all' weight='1'><waypoint time='0' degrees='3'/></posture>", "name it by 'joint'");
+  refuse_cost("<posture joint='x' degrees='30' weight='1'/>", "joint 'x' slides; give its metres in 'qpos'");
+  refuse_cost("<posture joint='knee' degrees='-30 1' weight='1'/>", "degrees");
+  refuse_cost("<posture joint='knee' degrees='-30' qpos='1' weight='1'/>", "contradicts attribute 'qpos'");
+  refuse_constraint("<posture joint='knee' degrees='-30' key='bent'/>", "contradicts attribute 'key'");
+  refuse_constraint("<posture joint='knee' degrees='-30'><waypoint time='0' degrees='3'/></posture>", "contradicts");
+  refuse("<problem name='p' model='leg.xml'>\n" SCENE
+         "<horizon duration='1'/>\n<start/><cost><posture joint='crate' degrees='1' weight='1'/></cost>\n</problem>",
+         7, "joint 'crate' is no hinge; give a posture by 'key' or 'qpos'");
   refuse_cost("<style name='brave'/>", "careful");
   refuse_cost("<style/>", "name");
   refuse_cost("<effort/>", "weight");

@@ -1,4 +1,4 @@
-/// Extents of geoms in the world. Private to dynamics/ and optim/.
+/// Extents of geoms in the world. Private to dynamics/, optim/ and the tool.
 #ifndef CAVORT_EXTENT_H
 #define CAVORT_EXTENT_H
 

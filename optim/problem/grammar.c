@@ -66,9 +66,9 @@ static const char *const parameters[CAV_PARAMETER_KINDS + 1] = {CAV_PARAMETERS(P
 // postures
 #define ROOT_PLACE                                                                                                     \
   TEXT("joint", "(the first free joint)", "free joint that is placed"),                                                \
-  REALS("pos", 3, 3, "m", "(as it was)", "position in the world"),                                                     \
+  REALS("pos", 3, 3, "m", "(as it was)", "position in the world: z is up, of most robots +x forwards and +y to the left"),                                                   \
   REALS("quat", 4, 4, "", "(as it was)", "orientation as a quaternion w x y z, brought to unit length"),               \
-  REALS("euler", 3, 3, "degrees", "(as it was)", "orientation by rotations about x, then the new y, then the new z"),  \
+  REALS("euler", 3, 3, "degrees", "(as it was)", "orientation by rotations about x, then the new y, then the new z, each right-handed: 0 0 90 is turned to the left"), \
   WORD("height", heights, "floor", "keep: height=\"floor\" of the posture leaves it where it is, as a ball in the air")
 #define JOINT_PLACE(one)                                                                                               \
   NEEDED("name", "joint that is set"), REALS("pos", 1, 1, "rad or m", one, "angle of a hinge, distance of a slide"),   \
@@ -91,7 +91,7 @@ static const cav_xml_element start_joint = {
         REALS("vel", 1, 1, "rad/s or m/s", "(0)", "velocity of a hinge or a slide at the start")),
     NULL, 0, "sets one joint"};
 #define POSE_SOURCE                                                                                                    \
-  TEXT("key", "(the model's own configuration)", "keyframe of the model or else <pose> of this file to begin with; \"stand\", \"kneel\", \"sit\", \"lie-back\" and more are found of any humanoid (help postures)"), \
+  TEXT("key", "(the model's own configuration)", "keyframe of the model or else <pose> of this file to begin with; \"stand\", \"kneel\", \"sit\", \"lie-back\" and more are found of any humanoid (help postures). <joint> and <root> inside lie over it: one leg lifted, say"), \
   REALS("qpos", 1, 0, "rad or m", "(the model's own configuration)", "all nq coordinates to begin with, in MuJoCo's layout"), \
   TEXT("file", "(the model's own configuration)", "trajectory.csv to take a knot of, relative to this file"),          \
   WORD("knot", ends, "last", "knot of that file"),                                                                     \
@@ -141,8 +141,9 @@ static const cav_xml_element pose = {
 #define RATE_ATTRIBUTES                                                                                                \
   DOFS, TABLE, REALS("target", 1, 0, "of the term", "(0)", "wanted rate: one number, or one for each selected dof")
 #define POSTURE_ATTRIBUTES                                                                                             \
-  DOFS, TABLE, TEXT("key", "(the goal)", "wanted posture: keyframe of the model or <pose> of this file"),              \
-  REALS("qpos", 1, 0, "rad or m", "(the goal)", "wanted posture: all nq coordinates, or of one hinge or slide its number")
+  DOFS, TABLE, TEXT("key", "(the goal)", "wanted posture: keyframe of the model or <pose> of this file, as <pose name=\"one leg\" key=\"stand\"> with the <joint>s of the lifted leg inside"),              \
+  REALS("qpos", 1, 0, "rad or m", "(the goal)", "wanted posture: all nq coordinates, or of one hinge or slide its number"), \
+  REALS("degrees", 1, 1, "degrees", "(the goal)", "wanted angle of the one hinge that joint= names")
 #define ONE_OBJECT "(give exactly one of body, xbody, geom, site, joint, tendon, actuator)"
 #define SENSOR_SOURCE                                                                                              \
   WORD("type", sensors, "(the sensor of the model by that name)", "what is read, by MJCF's names"),                    \
@@ -160,11 +161,13 @@ static const cav_xml_element pose = {
         "(0; the unit quaternion; none for places in the world and directions unless relative)",                       \
         "wanted reading: all values, or that of the component"),                                                       \
   WORD("relative", relations, "none", "the target is counted from the reading at the start or the goal posture")
+#define ONE_POSTURE "(give exactly one of key, qpos, degrees)"
 static const cav_xml_element posture_waypoint = {
     "waypoint", 0, 0,
     ATTRIBUTES(
-        REAL("time", 1, "s", NULL, "when"), TEXT("key", "(qpos)", "posture wanted then: a keyframe or a <pose>"),
-        REALS("qpos", 1, 0, "rad or m", "(key)", "posture wanted then, as numbers")),
+        REAL("time", 1, "s", NULL, "when"), TEXT("key", ONE_POSTURE, "posture wanted then: a keyframe or a <pose>"),
+        REALS("qpos", 1, 0, "rad or m", ONE_POSTURE, "posture wanted then, as numbers"),
+        REALS("degrees", 1, 1, "degrees", ONE_POSTURE, "angle of the one hinge wanted then")),
     NULL, 0, "target of a <posture> at a time, linear between such times"};
 static const cav_xml_element value_waypoint = {
     "waypoint", 0, 0,
@@ -225,7 +228,7 @@ static const cav_xml_element track_frame = {
 #define TERM_CONTACTS(use, element) ATTRIBUTES(TEXT("body", "(all contacts)", "contacts of this body's link alone; such a term is added to the default one. Of force also a body that is fixed to the world: what should not be touched"), WINDOW, WITHIN_##element use), NULL
 
 #define COST                                                                                                           \
-  REAL("weight", 1, "", NULL, "the cost is weight/2 times the squared residual, integrated over the window in s, or at one knot as it is; 0 removes a default; at most 1e16"), \
+  REAL("weight", 1, "", NULL, "the cost is weight/2 times the squared residual, integrated over the window in s, or at one knot as it is; goals usually take 500 to 5000, costs over the motion 0.01 to 10, of contacts more; 0 removes a default; at most 1e16"), \
   WORD("norm", cav_problem_norms, "square", "square: x^2/2 of each residual x; absolute: sqrt(1 + x^2) - 1, linear far beyond the scale")
 #define COST_ELEMENT(quantity, element, of, reads, hard, unit, words, text) \
   static const cav_xml_element cost_##element = {#element, 0, 0, TERM_##of(COST, element), 0, text};

@@ -194,15 +194,39 @@ static cav_status make_targets(const cav_problem_reader *reader, const cav_xml_n
   return CAV_OK;
 }
 
-// a posture by keyframe or numbers, or by one number where the term is of one hinge or slide; neither: found stays 0
+static int gives_posture(const cav_xml_node *node) {
+  return cav_xml_get(node, "key") || cav_xml_get(node, "qpos") || cav_xml_get(node, "degrees");
+}
+
+// the goal's posture, but for the angle of the one hinge that the term is of
+static cav_status angle_of(const cav_problem_reader *reader, const cav_xml_node *node, const cav_term *term,
+                           double *q) {
+  const cav_model *m = reader->model;
+  const cav_joint *one = term->dofs == CAV_DOFS_ONE ? &m->joint[term->joint] : NULL;
+  if (!one)
+    return cav_xml_fail(reader->error, node, "degrees", "is the angle of one hinge; name it by 'joint' of <posture>");
+  if (one->type == CAV_JOINT_SLIDE)
+    return cav_xml_fail(reader->error, node, "degrees", "joint '%s' slides; give its metres in 'qpos'", one->name);
+  if (one->type != CAV_JOINT_HINGE)
+    return cav_xml_fail(reader->error, node, "degrees", "joint '%s' is no hinge; give a posture by 'key' or 'qpos'",
+                        one->name);
+  memcpy(q, reader->problem->q_goal, (size_t)m->nq * sizeof *q);
+  q[one->q] = cav_xml_real(node, "degrees", 0) * M_PI / 180;
+  return CAV_OK;
+}
+
+// a posture by keyframe or numbers, or by one number where the term is of one hinge or slide
 static cav_status posture_of(const cav_problem_reader *reader, const cav_xml_node *node, const cav_term *term,
-                             double *q, int *found) {
+                             double *q) {
   const cav_model *m = reader->model;
   const cav_xml_value *numbers = cav_xml_get(node, "qpos");
-  if (numbers && cav_xml_get(node, "key"))
+  const int key = cav_xml_get(node, "key") != NULL;
+  if (numbers && key)
     return cav_xml_fail(reader->error, node, "qpos", "contradicts attribute 'key'; give one of the two");
-  *found = numbers || cav_xml_get(node, "key");
-  if (!*found) return CAV_OK;
+  if ((numbers || key) && cav_xml_get(node, "degrees"))
+    return cav_xml_fail(reader->error, node, "degrees", "contradicts attribute '%s'; give one of the two",
+                        key ? "key" : "qpos");
+  if (cav_xml_get(node, "degrees")) return angle_of(reader, node, term, q);
   if (!numbers) return cav_problem_key(reader, node, q);
   const cav_joint *one = term->dofs == CAV_DOFS_ONE ? &m->joint[term->joint] : NULL;
   if (one && numbers->count == 1 && (one->type == CAV_JOINT_HINGE || one->type == CAV_JOINT_SLIDE)) {
@@ -222,7 +246,7 @@ static cav_status posture_of(const cav_problem_reader *reader, const cav_xml_nod
 static cav_status read_posture(const cav_problem_reader *reader, const cav_xml_node *node, cav_term *term) {
   cav_status status = read_dofs(reader, node, term);
   const cav_xml_node *waypoint = cav_problem_child(node, "waypoint");
-  int found, own = cav_xml_get(node, "key") || cav_xml_get(node, "qpos");
+  int own = gives_posture(node);
   if (!status)
     status = check_sources(reader, node, own ? "the posture that <posture> gives" : waypoint ? "<waypoint>" : NULL);
   if (!status && cav_xml_get(node, "file")) return read_table(reader, node, term, reader->model->nq);
@@ -233,10 +257,11 @@ static cav_status read_posture(const cav_problem_reader *reader, const cav_xml_n
   double *target;
   int nq = reader->model->nq;
   status = make_targets(reader, node, nq, term, &target);
-  if (!status && own) return posture_of(reader, node, term, target, &found);
+  if (!status && own) return posture_of(reader, node, term, target);
   for (int i = 0; waypoint && !status; i++, waypoint = cav_xml_next(waypoint)) {
-    status = posture_of(reader, waypoint, term, target + i * nq, &found);
-    if (!status && !found) status = cav_xml_fail(reader->error, waypoint, "key", "is missing; give 'key' or 'qpos'");
+    if (!gives_posture(waypoint))
+      return cav_xml_fail(reader->error, waypoint, "key", "is missing; give 'key', 'qpos' or 'degrees'");
+    status = posture_of(reader, waypoint, term, target + i * nq);
   }
   return status;
 }

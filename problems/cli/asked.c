@@ -79,11 +79,30 @@ static void write_reading(const comparison *c, const cav_term *term, cav_state *
   }
 }
 
-/// What is wanted of a sensor at a time.
-static void write_wanted(const cav_term *term, double time, char *out) {
+/// The target of a sensor at a time.
+static void write_target(const cav_term *term, double time, char *out) {
   const cav_sensor *s = &term->sensor;
   double target[CAV_SENSOR_DIM_MAX];
   const int one = s->dim == 1 || term->component >= 0, k = s->dim == 1 ? 0 : term->component;
+  cav_term_target(term, time, s->dim, target);
+  if (one)
+    snprintf(out, CELL, "%.4g", cav_command_plain(target[k]));
+  else
+    snprintf(out, CELL, "%.4g %.4g %.4g", cav_command_plain(target[0]), cav_command_plain(target[1]),
+             cav_command_plain(target[2]));
+}
+
+/// Targets at the begin and the end of a window, as one where they are the same.
+static void write_both(const char *begin, const char *end, char *out) {
+  if (strcmp(begin, end))
+    snprintf(out, CELL, "from %.35s to %.35s", begin, end);
+  else
+    snprintf(out, CELL, "%s", end);
+}
+
+/// What is wanted of a sensor up to a time.
+static void write_wanted(const cav_term *term, double time, char *out) {
+  char begin[CELL], end[CELL];
   const int bounds = term->use == CAV_USE_RANGE && !term->target;
   if (bounds && isinf(term->upper))
     snprintf(out, CELL, ">= %.4g", term->lower);
@@ -91,15 +110,12 @@ static void write_wanted(const cav_term *term, double time, char *out) {
     snprintf(out, CELL, "<= %.4g", term->upper);
   else if (bounds)
     snprintf(out, CELL, "%.4g .. %.4g", term->lower, term->upper);
-  else if (s->dim == 4)
+  else if (term->sensor.dim == 4)
     snprintf(out, CELL, "0 off");
   else {
-    cav_term_target(term, time, s->dim, target);
-    if (one)
-      snprintf(out, CELL, "%.4g", cav_command_plain(target[k]));
-    else
-      snprintf(out, CELL, "%.4g %.4g %.4g", cav_command_plain(target[0]), cav_command_plain(target[1]),
-               cav_command_plain(target[2]));
+    write_target(term, term->from, begin);
+    write_target(term, time, end);
+    write_both(begin, end, out);
   }
 }
 
@@ -136,6 +152,14 @@ static void write_dof(const cav_model *m, const double *wanted, const double *q,
   }
 }
 
+/// The posture that a term wants at a time.
+static void find_wanted(const cav_problem *p, const cav_term *term, double time, double *wanted) {
+  memcpy(wanted, p->q_goal, (size_t)p->model->nq * sizeof *wanted);
+  if (!term->target) return;
+  cav_term_target(term, time, p->model->nq, wanted);
+  cav_configuration_normalise(p->model, wanted);
+}
+
 /// The row of a posture term: of the dof that is farthest off, at the start or at the goal. 0: the term selects none.
 static int write_posture(const comparison *c, const cav_term *term, char name[NAME], char cell[3][CELL],
                          char unit[16]) {
@@ -143,9 +167,8 @@ static int write_posture(const comparison *c, const cav_term *term, char name[NA
   const cav_problem *p = c->p;
   const cav_model *m = p->model;
   double *wanted = c->work, *d = wanted + m->nq, *other = d + m->nv;
-  memcpy(wanted, p->q_goal, (size_t)m->nq * sizeof *wanted);
-  if (term->target) cav_term_target(term, time_of(p, term), m->nq, wanted);
-  if (term->target) cav_configuration_normalise(m, wanted);
+  char begin[CELL], end[CELL];
+  find_wanted(p, term, time_of(p, term), wanted);
   const int a = farthest(p, term, wanted, p->q_start, d), b = farthest(p, term, wanted, p->q_goal, other);
   if (a < 0) return 0;
   const int at = other[b] > d[a] ? b : a;
@@ -159,7 +182,10 @@ static int write_posture(const comparison *c, const cav_term *term, char name[NA
                     : "");
   write_dof(m, wanted, p->q_start, at, d, cell[0]);
   write_dof(m, wanted, p->q_goal, at, d, cell[1]);
-  write_dof(m, wanted, wanted, at, d, cell[2]);
+  write_dof(m, wanted, wanted, at, d, end);
+  find_wanted(p, term, term->from, wanted);
+  write_dof(m, wanted, wanted, at, d, begin);
+  write_both(begin, end, cell[2]);
   snprintf(unit, 16, "%s", joint->type == CAV_JOINT_SLIDE || (free && place < 3) ? "m" : "rad");
   if (term->use == CAV_USE_RANGE) snprintf(cell[2], CELL, "its bounds");
   return 1;
@@ -270,8 +296,9 @@ static int tell_degrees(FILE *out, const cav_problem *p, const cav_term *term) {
   const cav_joint *joint = &m->joint[sensor ? term->sensor.object : term->joint];
   const double wanted = joint->type == CAV_JOINT_HINGE ? term->target[sensor ? 0 : joint->q] : 0;
   if (!(fabs(wanted) > many_turns)) return 0;
-  fprintf(out, "note: %s wants joint '%.60s' at %g rad, %.3g turns: targets are in radians; %g degrees are %.4g\n",
-          called(p, term, name), joint->name, wanted, fabs(wanted) / (2 * M_PI), wanted, wanted * M_PI / 180);
+  fprintf(out, "note: %s wants joint '%.60s' at %g rad, %.3g turns: %s; %g degrees are %.4g\n", called(p, term, name),
+          joint->name, wanted, fabs(wanted) / (2 * M_PI),
+          posture ? "qpos is in radians, degrees= is not" : "targets are in radians", wanted, wanted * M_PI / 180);
   return 1;
 }
 

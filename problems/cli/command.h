@@ -229,6 +229,9 @@ double cav_command_plain(double x);
 /// that a term of roots counts, and of a thing that may have to slide or roll; their number. asked.c.
 int cav_command_tell_units(FILE *out, const cav_problem *problem);
 
+/// Prints where surfaces of roles and things end, at the posture of the file or, of a problem, at its start. extents.c.
+cav_status cav_command_print_extents(const cav_model *model, const cav_problem *problem, cav_error *error);
+
 /// Prints what terms with a target read at the start and at the goal, and what they want: a line each. asked.c.
 cav_status cav_command_print_asked(const cav_problem *problem, cav_error *error);
 

@@ -426,6 +426,7 @@ static cav_status print_model(const cav_model *m, const cav_problem *p, int all,
     print_bodies(m);
     cav_status status = print_joints(m, p, error);
     if (!status) status = print_places(m, p, error);
+    if (!status) status = cav_command_print_extents(m, p, error);
     if (status) return status;
     print_geoms(m);
     print_keyframes(m);
@@ -466,9 +467,9 @@ int cav_command_inspect(const cav_command_line *line) {
         "weight=\"900\"/> in <cost> "
         "asks for it\n");
   if (!status && !line->all)
-    printf(scene.problem
-               ? "\n--all: joints, places of bodies, roles, equations, schedule, and what an evaluation runs\n"
-               : "\n--all: what an evaluation runs and leaves out, its time and memory\n");
+    printf(scene.problem ? "\n--all: joints, places of bodies, where surfaces end, roles, equations, schedule, and "
+                           "what an evaluation runs\n"
+                         : "\n--all: what an evaluation runs and leaves out, its time and memory\n");
   // the verdict once more, where nothing buries it
   const int refused = scene.problem && cav_command_count_planned(scene.model) < scene.model->nu;
   if (!status && scene.problem)

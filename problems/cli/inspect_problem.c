@@ -48,29 +48,65 @@ static void print_posture_bounds(const cav_problem *p, const cav_term *term) {
          joint->type == CAV_JOINT_SLIDE ? "m" : "rad");
 }
 
+enum { VALUE = 120 };
+
+// one target of a term; nothing of a posture of many joints, and of rates that differ
+static void write_target(const cav_problem *p, const cav_term *term, const double *target, char text[VALUE]) {
+  const cav_model *m = p->model;
+  const cav_joint *joint = term->dofs == CAV_DOFS_ONE ? &m->joint[term->joint] : NULL;
+  const int one = term->component >= 0 && term->sensor.dim != 4;
+  const double *rate = NULL;
+  int n = 0, alike = 1;
+  *text = 0;
+  if (term->quantity == CAV_QUANTITY_SENSOR) {
+    for (int i = one ? term->component : 0; i < (one ? term->component + 1 : term->sensor.dim); i++)
+      n += snprintf(text + n, (size_t)(VALUE - n), "%s%.4g", n ? " " : "", cav_command_plain(target[i]));
+  } else if (term->quantity == CAV_QUANTITY_CONFIGURATION && joint) {
+    const double q = cav_command_plain(target[joint->q]);
+    if (joint->type == CAV_JOINT_HINGE) snprintf(text, VALUE, "%.4g rad (%.4g degrees)", q, q * 180 / M_PI);
+    if (joint->type == CAV_JOINT_SLIDE) snprintf(text, VALUE, "%.4g m", q);
+  } else if (cav_quantity_rule_of(term->quantity)->of == CAV_OF_RATE) {
+    for (int d = 0; d < m->nv; d++) {
+      if (!cav_problem_selects(m, term, d)) continue;
+      if (!rate) rate = &target[d];
+      alike &= target[d] == *rate;
+    }
+    if (rate && alike) snprintf(text, VALUE, "%.4g", cav_command_plain(*rate));
+  }
+}
+
+// targets along waypoints by the first and the last
+static void print_waypoints(const cav_problem *p, const cav_term *term) {
+  const int length = cav_term_target_length(p->model, term);
+  char first[VALUE], last[VALUE];
+  write_target(p, term, term->target, first);
+  write_target(p, term, term->target + (size_t)(term->nwaypoint - 1) * (size_t)length, last);
+  if (*first && *last) printf(" to %s .. %s", first, last);
+  printf(" along %d waypoints", term->nwaypoint);
+}
+
 // what a term is held against
 static void print_target(const cav_problem *p, const cav_term *term) {
   const int about = term->quantity == CAV_QUANTITY_SENSOR && term->target;
+  char value[VALUE] = "";
   if (term->use == CAV_USE_RANGE && !about) {
     if (isfinite(term->lower)) printf(" at least %g", term->lower);
     if (isfinite(term->upper)) printf("%s at most %g", isfinite(term->lower) ? " and" : "", term->upper);
     if (term->quantity == CAV_QUANTITY_CONFIGURATION) print_posture_bounds(p, term);
     return;
   }
-  if (term->nwaypoint) {
-    printf(" along %d waypoints", term->nwaypoint);
+  if (term->target) write_target(p, term, term->target, value);
+  if (term->nwaypoint > 1) {
+    print_waypoints(p, term);
   } else if (term->track) {
     const cav_track *track = term->track;
     printf(": %d channels, %d frames", track->nchannel, track->nframe);
     if (track->unused) printf(", %d columns of the file not asked for", track->unused);
     if (track->absent) printf(", %d markers of the set not in the file", track->absent);
+  } else if (*value) {
+    printf(" to %s", value);
   } else if (term->quantity == CAV_QUANTITY_CONFIGURATION) {
     printf(" to %s", term->target ? "its own posture" : "the goal");
-  } else if (about) {
-    int rotation = term->sensor.dim == 4, one = term->component >= 0 && !rotation;
-    printf(" to");
-    for (int i = one ? term->component : 0; i < (one ? term->component + 1 : term->sensor.dim); i++)
-      printf(" %.4g", cav_command_plain(term->target[i]));
   } else if (term->quantity == CAV_QUANTITY_SENSOR) {
     printf(term->sensor.dim == 4 ? " to no rotation" : " to 0");
   }

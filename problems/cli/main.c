@@ -84,9 +84,8 @@ static const cav_manual_option options[] = {
     {OPTION_QUICK, "--quick", NULL, NULL, "in seconds instead of minutes: fewer values, states, steps and repeats"},
     {OPTION_FORCE, "--force", NULL, NULL, "solve what is proven impossible all the same"},
     {OPTION_ALL, "--all", NULL, NULL,
-     "explain: all that is missed, and all that pulls, with what usually helps; inspect: joints and places of a "
-     "problem's "
-     "model, equations, what an evaluation runs, takes and leaves out"},
+     "explain: all that is missed, and all that pulls, with what usually helps; inspect: joints, places and "
+     "surfaces of a problem's model, equations, what an evaluation runs, takes and leaves out"},
     {OPTION_JSON, "--json", NULL, NULL, "print as JSON what would be a table"},
     {OPTION_JOBS, "--jobs", "-j", "N",
      "several problems: so many at once, each with one thread (default: as many as processors)"},

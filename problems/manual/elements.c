@@ -122,6 +122,14 @@ static void print_attribute(FILE *out, const cav_xml_attribute *a) {
   fprintf(out, "\n%19s%s\n", "", a->note->text);
 }
 
+// names of the attributes that all children have
+static void print_common(FILE *out, const cav_xml_element *e) {
+  int n = 0;
+  for (const cav_xml_attribute *a = e->child ? e->child[0]->attribute : NULL; a && a->name; a++)
+    if (a->note && cav_manual_common(e, a)) fprintf(out, "%s%s", n++ ? ", " : "  all of these have ", a->name);
+  if (n) fprintf(out, "\n");
+}
+
 static void print_element(FILE *out, const cav_manual_place *place, const cav_manual_place *twin) {
   const cav_xml_element *e = place->element;
   fprintf(out, "<%s>", e->name);
@@ -133,6 +141,7 @@ static void print_element(FILE *out, const cav_manual_place *place, const cav_ma
     if (!cav_manual_attribute(e, a->name)) fprintf(out, "  no %s\n", a->name);
   for (int i = 0; !twin && e->child && e->child[i]; i++)
     fprintf(out, "%s<%s>%s", i ? ", " : "  holds ", e->child[i]->name, e->child[i + 1] ? "" : "\n");
+  if (!twin) print_common(out, e);
 }
 
 // whether an attribute of that meaning was told of an element before

@@ -243,7 +243,8 @@ static void print_roles(FILE *out) {
 static void print_postures(FILE *out) {
   fprintf(out,
           "\n## Postures\n\nNames for `key` that are found for any humanoid with a free root, `stand` and `lie` of "
-          "quadrupeds too, where neither\nthe file nor the model has a posture of that name.\n\n| name | posture "
+          "quadrupeds too, where neither\nthe file nor the model has a posture of that name. "
+          "`joint`s inside lie over it, as those of a leg that is\nlifted.\n\n| name | posture "
           "|\n|---|---|\n| `stand` | nearly straight on both or all four feet |\n");
   for (int i = 0; cav_posture_names[i]; i++)
     fprintf(out, "| `%s` | %s |\n", cav_posture_names[i], cav_posture_meaning(cav_posture_names[i]));

@@ -192,6 +192,9 @@ static void print_postures(FILE *out, const cav_manual *manual) {
           "stand");
   for (int i = 0; cav_posture_names[i]; i++)
     fprintf(out, "  %-11s %s\n", cav_posture_names[i], cav_posture_meaning(cav_posture_names[i]));
+  fprintf(out,
+          "joints inside lie over it, as of a leg that is lifted: <start key=\"stand\" height=\"floor\">\n"
+          "  <joint name=\"NAME\" degrees=\"-60\"/></start>\n");
 }
 
 static void print_schema(FILE *out, const cav_manual *manual) {

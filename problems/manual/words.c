@@ -40,6 +40,11 @@ static const struct {
      "a motion is achieved if every target is met to within its tolerance; exit status 0 needs that, and cavort "
      "inspect\n  PROBLEM marks the terms that count",
      "within"},
+    {"expect|expects|expected|require|required|requirement|must|assert",
+     "what a motion has to do is a target, met to within its tolerance (achieved); what every solution has to hold is "
+     "a\n"
+     "  term of <constraint>, with lower=, upper= or within=",
+     "within"},
     {"certified|certificate|certification|verdict|valid",
      "a motion is certified if it obeys physics and limits, by a verifier apart from the solver; what that requires:\n"
      "  problems/README.md, Result folders. Whether it does what was asked is another matter (achieved)",
@@ -119,8 +124,8 @@ static const struct {
      "joint's\n  angle is type=\"jointpos\", all joints at once are <posture>",
      "framepos"},
     {"angle|angles|bend",
-     "of a posture <joint name=\"NAME\" degrees=\"30\"/>; as a wish type=\"jointpos\" (rad) or "
-     "<posture joint=\"NAME\"/>",
+     "of a posture <joint name=\"NAME\" degrees=\"30\"/>; as a wish <posture joint=\"NAME\" degrees=\"30\"/> or\n"
+     "  type=\"jointpos\" (rad)",
      "joint"},
     {"torques|motor|motors|muscle|muscles|strength",
      "forces of actuators are planned within their limits: <effort> is their cost, <limits effort> how much of them is "
@@ -236,11 +241,10 @@ static const struct {
      "  a walk from start to goal needs neither, its gait is found",
      "cycle"},
     {"turn|yaw|pirouette",
-     "how a body is turned at the end: <root pos=\"X Y Z\" euler=\"0 0 90\"/> of <goal>, degrees, and a posture that "
-     "asks "
-     "for it\n"
-     "  (dofs=\"all\"); of a cycle rotation=. Which way a turn by more than 180 degrees goes is said by rotation= of "
-     "<guess>",
+     "how a body is turned at the end: <root pos=\"X Y Z\" euler=\"0 0 90\"/> of <goal>, degrees to the left, and a "
+     "posture that\n"
+     "  asks for it (dofs=\"all\"); of a cycle rotation=. Which way a turn by more than 180 degrees goes is said by "
+     "rotation=\n  of <guess>",
      "euler"},
     {"wheel|wheels|flywheel|reaction|pendulum|balance|balancing|unstable|swingup",
      "what turns without end is no posture: <posture joint=\"wheel\" weight=\"0\"/>, and <velocity joint=\"wheel\" "
