@@ -368,9 +368,9 @@ cav_status cav_augmented_lagrangian(cav_solve_run *run) {
   return status;
 }
 
-/// Restoration with rows of efforts and ranges let go by a fraction of what is allowed of them.
-static cav_status restore(cav_solve_run *run, double fraction) {
-  violation most = allowed(run), is = {0};
+/// Restoration until no row is further off than that, with rows of efforts and ranges let go by a fraction of it.
+static cav_status restore(cav_solve_run *run, violation most, double fraction) {
+  violation is = {0};
   cav_transcription *tr = run->tr;
   int begin = run->solution->iterations;
   cav_region region = run->region;
@@ -412,7 +412,7 @@ cav_status cav_restore(cav_solve_run *run) {
   run->stage = 1;
   cav_trajectory *before = cav_trajectory_copy(run->at);
   if (!before) return CAV_NO_MEMORY;
-  cav_status status = restore(run, 0.9);
+  cav_status status = restore(run, allowed(run), 0.9);
   if (status != CAV_NOT_CONVERGED) {
     cav_trajectory_free(before);
     return status;
@@ -421,7 +421,17 @@ cav_status cav_restore(cav_solve_run *run) {
   run->stage = 2;
   cav_trajectory_free(run->at);
   run->at = before;
-  return restore(run, 0);
+  return restore(run, allowed(run), 0);
+}
+
+cav_status cav_restore_limits(cav_solve_run *run) {
+  violation most = allowed(run);
+  most.effort = most.range = 0.5 * CAV_TOLERANCE_LIMIT;
+  if (!cav_run_met(run) || cav_run_within_limits(run)) return CAV_OK;
+  run->phase = "restoration";
+  run->stage = run->stages = 1;
+  const cav_status status = restore(run, most, 0);
+  return status == CAV_NOT_CONVERGED ? CAV_OK : status;
 }
 
 static cav_status rest_from_here(cav_solve_run *run, double radius) {

@@ -142,6 +142,10 @@ cav_status cav_augmented_lagrangian(cav_solve_run *run);
 /// say, so it is for the last millimetre only. CAV_NOT_CONVERGED if the rows do not come in.
 cav_status cav_restore(cav_solve_run *run);
 
+/// The same of a motion whose rows hold but for efforts and ranges that use what solving lets go of them: to where a certificate
+/// asks for them. What does not come in stays as it was, and is no failure.
+cav_status cav_restore_limits(cav_solve_run *run);
+
 /// Where constraints cannot all hold: to the point of least violation, where the violations balance and so say what
 /// contradicts what (explain.c): the lower of two, from the iterate and, where that is far off, from the guess.
 cav_status cav_minimise_infeasibility(cav_solve_run *run);

@@ -96,10 +96,11 @@ static int moves_things(const cav_model *model) {
 
 cav_status cav_to_optimum(cav_solve_run *run) {
   cav_status status = bring_in(run);
-  if (status != CAV_NOT_CONVERGED || !moves_things(run->tr->model)) return status;
-  // rows of what is pushed cannot all hold within small boxes: penalties that grow there leave no step
-  run->checks_raises = 1;
-  status = descend(run);
-  run->checks_raises = 0;
-  return status;
+  if (status == CAV_NOT_CONVERGED && moves_things(run->tr->model)) {
+    // rows of what is pushed cannot all hold within small boxes: penalties that grow there leave no step
+    run->checks_raises = 1;
+    status = descend(run);
+    run->checks_raises = 0;
+  }
+  return status == CAV_OK && !run->refused ? cav_restore_limits(run) : status;
 }
