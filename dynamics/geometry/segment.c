@@ -295,22 +295,20 @@ typedef struct derivatives {
 
 static drift drift_of(const cav_shape *a, const cav_shape *b, const segment *g, const double point[3]) {
   drift m;
-  double arm[3], half[3], moved[3];
+  double arm[3], half[3];
   sub3(arm, a->pos, point);
   rotate(half, b->rotation, g->half);
   for (int k = 0; k < 6; k++) {
     const double e[3] = {k % 3 == 0, k % 3 == 1, k % 3 == 2};
-    zero3(m.half[k]);
-    if (k >= 3) {
-      scale3(moved, -1, e);
+    double shift[3], turn[3] = {0};
+    if (k < 3) {
+      cross3(shift, arm, e);
+      cross3(turn, half, e);
     } else {
-      cross3(moved, arm, e);
-      rotate_back(m.centre[k], b->rotation, moved);
-      cross3(moved, half, e);
-      rotate_back(m.half[k], b->rotation, moved);
-      continue;
+      scale3(shift, -1, e);
     }
-    rotate_back(m.centre[k], b->rotation, moved);
+    rotate_back(m.centre[k], b->rotation, shift);
+    rotate_back(m.half[k], b->rotation, turn);
   }
   return m;
 }

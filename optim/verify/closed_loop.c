@@ -8,7 +8,7 @@
 #include "verification.h"
 
 // s: impulse of the smallest push over the weight, which changes the velocity of a body that stands by 0.03 m/s; when it
-// comes, a fraction of the motion; the number of pushes tried, each twice the one before
+// comes, a fraction of the motion; rungs of pushes, each twice the one before
 static const double small_push = 0.003, pushed_at = 1.0 / 3;
 enum { PUSHES = 5 };
 
@@ -26,34 +26,19 @@ static int pushed_link(const cav_verification *verification) {
   return found;
 }
 
-// the way that ends farthest off comes first: of the next push, twice as large, it is most likely to be lost
-static void put_worst_first(int order[4], const double error[4]) {
-  for (int i = 1; i < 4; i++)
-    for (int k = i; k > 0 && error[order[k]] > error[order[k - 1]]; k--) {
-      const int held = order[k];
-      order[k] = order[k - 1], order[k - 1] = held;
-    }
-}
-
 size_t cav_before_numbers(const cav_verification *verification) {
   return (size_t)verification->model->nq + 2 * (size_t)verification->model->nv;
 }
 
-/// Pushes of one size all four ways, worst way first, until one is lost; order is that of the next size.
-static cav_status push_all_ways(const cav_verification *verification, const double *gain_q, const double *gain_v,
-                                double size, cav_disturbance *push, int order[4], int *survived) {
-  static const double way[4][2] = {{1, 0}, {-1, 0}, {0, 1}, {0, -1}};
+/// Whether the motion survives the push of a rung, each twice the one before, one of four ways.
+static cav_status push_way(const cav_verification *verification, const double *gain_q, const double *gain_v, int way,
+                           int rung, cav_disturbance *push, int *survives) {
+  static const double to[4][2] = {{1, 0}, {-1, 0}, {0, 1}, {0, -1}};
   struct cav_follow follow = {0};
-  double error[4];
-  cav_status status = CAV_OK;
-  for (int i = 0; i < 4 && status == CAV_OK && !*follow.lost; i++) {
-    const int k = order[i];
-    push->impulse[0] = size * way[k][0], push->impulse[1] = size * way[k][1];
-    status = cav_replay_own(verification, 0, gain_q, gain_v, push, &follow);
-    error[k] = follow.error;
-  }
-  *survived = status == CAV_OK && !*follow.lost;
-  if (*survived) put_worst_first(order, error);
+  const double size = ldexp(small_push * verification->weight, rung);
+  push->impulse[0] = size * to[way][0], push->impulse[1] = size * to[way][1];
+  const cav_status status = cav_replay_own(verification, 0, gain_q, gain_v, push, &follow);
+  *survives = status == CAV_OK && !*follow.lost;
   return status;
 }
 
@@ -62,19 +47,18 @@ cav_status cav_closed_loops_push(const cav_verification *verification, const dou
   cav_before before = {.x = malloc(cav_before_numbers(verification) * sizeof *before.x)};
   cav_disturbance push = {.link = pushed_link(verification), .fraction = pushed_at, .before = &before};
   cav_status status = before.x ? CAV_OK : CAV_NO_MEMORY;
-  int order[4] = {0, 1, 2, 3}, stands = push.link > 0;
-  *survived = stands ? 0 : NAN;
-  // most motions survive the second: the first is tried where it is lost
-  for (int rung = 1; rung < PUSHES && stands && status == CAV_OK; rung++) {
-    const double size = ldexp(small_push * verification->weight, rung);
-    status = push_all_ways(verification, gain_q, gain_v, size, &push, order, &stands);
-    if (stands) *survived = size;
+  int top = 0, survives = push.link > 0;
+  *survived = survives ? 0 : NAN;
+  // up one way from the second rung on, which most motions survive, then down the others
+  for (int rung = 1; rung < PUSHES && survives && status == CAV_OK; rung++) {
+    status = push_way(verification, gain_q, gain_v, 0, rung, &push, &survives);
+    if (survives) top = rung;
   }
-  if (*survived == 0 && status == CAV_OK) {
-    const double size = small_push * verification->weight;
-    status = push_all_ways(verification, gain_q, gain_v, size, &push, order, &stands);
-    if (stands) *survived = size;
+  for (int way = top > 0; way < 4 && top >= 0 && push.link > 0 && status == CAV_OK; way++) {
+    for (survives = 0; top >= 0 && !survives && status == CAV_OK; top -= !survives)
+      status = push_way(verification, gain_q, gain_v, way, top, &push, &survives);
   }
+  if (status == CAV_OK && push.link > 0 && top >= 0) *survived = ldexp(small_push * verification->weight, top);
   free(before.x);
   return status;
 }
