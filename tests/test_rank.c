@@ -98,6 +98,17 @@ static void test_worth(void) {
 }
 
 // mending is put off once it has taken longer than what it mends, and goes on when more was solved
+// what is certified and misses little is mended before anything is sought, however long that took so far
+static void test_close(void) {
+  cav_race_report r = {.solution = 1};
+  r.verdict.certified = 1, r.verdict.ntarget = 3, r.verdict.nmissed = 1, r.verdict.missed_most = 1.25;
+  CHECK(cav_rank_close(&r));
+  r.verdict.missed_most = 1.01 * CAV_MISSED_LITTLE;
+  CHECK(!cav_rank_close(&r));
+  r.verdict.missed_most = 1.25, r.verdict.certified = 0;
+  CHECK(!cav_rank_close(&r));
+}
+
 static void test_spent(void) {
   cav_problem problem = {.timestep = 0.02, .duration = 2};
   cav_race race = {.problem = &problem, .n = 6};
@@ -231,6 +242,7 @@ int main(void) {
   test_off();
   test_nearer();
   test_spent();
+  test_close();
   test_momentum();
   test_deep();
   test_helped();

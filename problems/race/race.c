@@ -586,12 +586,12 @@ static int may_start(const cav_race *race, int i) {
     success |= e->state == CAV_RACE_DONE && cav_race_success(&e->report);
   }
   if (race->entry[i].strategy.open && !misses_rest(race)) return 0;
-  if (use == CAV_STRATEGY_NEAR && cav_rank_spent(race, i)) return 0;
   cav_strategy repaired;
   int of, cure;
-  const int mends = use == CAV_STRATEGY_REPAIR || use == CAV_STRATEGY_NEAR;
+  const int near = use == CAV_STRATEGY_NEAR, mends = use == CAV_STRATEGY_REPAIR || near;
   int repairs = mends && !success && find_repair(race, i, &repaired, &of, &cure);
   if (repairs) cav_strategy_clear(&repaired);
+  if (repairs && near && cav_rank_spent(race, i) && !cav_rank_close(&race->entry[of].report)) return 0;
   return use == CAV_STRATEGY_MOMENTUM ? momentum : mends ? repairs : !success;
 }
 

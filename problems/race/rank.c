@@ -86,6 +86,10 @@ int cav_rank_rough(const cav_verdict *v) {
          v->slip_mean_m_s <= several * CAV_TOLERANCE_SLIP && v->hover_fraction <= several * CAV_TOLERANCE_HOVER;
 }
 
+int cav_rank_close(const cav_race_report *report) {
+  return report->verdict.certified && misses_little(&report->verdict);
+}
+
 int cav_rank_near(const cav_race_report *report, double effort) {
   const cav_verdict *v = &report->verdict;
   if (!report->solution || report->status == CAV_INTERRUPTED) return 0;
