@@ -53,6 +53,13 @@ static int only_hangs(const cav_problem *p) {
   return 1;
 }
 
+/// Whether the problem itself has a term of the quantity.
+static int is_stated(const cav_problem *p, cav_quantity quantity) {
+  for (int i = 0; i < p->nterm; i++)
+    if (p->term[i].quantity == quantity) return 1;
+  return 0;
+}
+
 /// What a motion misses first, in the order of a certificate (METHOD.md, 6), most of momentum, slip and hover, and its
 /// cures. Forces near a record are what is looked for: none of them costs anything. A residual beyond its bound is
 /// what the model cannot do. What people do on the edges of their feet is nearer where these may slide, and on softer
@@ -61,9 +68,9 @@ static const cure *cures_of(const cav_problem *p, const cav_verdict *v) {
   static const cure forces[] = {EFFORT, STEP, NONE}, deep[] = {SOFTNESS, STEP, NONE}, between[] = {STEP, NONE},
                     turned[] = {ORDER, STEP, NONE}, slip[] = {SMOOTHING, SLIP, SOFTNESS},
                     rub[] = {SELF, SMOOTHING, SLIP}, limbs[] = {CLOSER, SELF, STEP}, hover[] = {GAP, SMOOTHING, STEP},
-                    fold[] = {SLIDING, STEP, NONE}, lost[] = {FORCE, STEP, SLACK}, target[] = {EFFORT, ANEW, GOALS},
-                    close[] = {BIT, EFFORT, GOALS}, fades[] = {SMOOTHING, GAP, STEP}, near[] = {STEP, SLACK, NONE},
-                    again[] = {STEP, SLIDING, NONE}, off_slip[] = {OFF, SMOOTHING, SLIP},
+                    fold[] = {SLIDING, STEP, NONE}, lost[] = {FORCE, STEP, SLACK}, priced[] = {SLACK, FORCE, STEP},
+                    target[] = {EFFORT, ANEW, GOALS}, close[] = {BIT, EFFORT, GOALS}, fades[] = {SMOOTHING, GAP, STEP},
+                    near[] = {STEP, SLACK, NONE}, again[] = {STEP, SLIDING, NONE}, off_slip[] = {OFF, SMOOTHING, SLIP},
                     off_hover[] = {OFF, GAP, SMOOTHING}, ground[] = {STEP, LOOSE, SOFTER}, none[] = {NONE};
   if (v->certified)
     return v->achieved ? none : v->missed_most > 0 && v->missed_most < CAV_MISSED_LITTLE ? close : target;
@@ -83,7 +90,8 @@ static const cure *cures_of(const cav_problem *p, const cav_verdict *v) {
   if (air > 1) return blurred ? fades : hover;
   if (v->replay_step_max_error > CAV_TOLERANCE_STEP) return cav_problem_has_record(p) ? again : fold;
   if (v->residual_fraction_max > v->residual_within) return none;
-  return cav_problem_has_record(p) ? near : lost;
+  // where forces cost something feedback has too little left, rather than standing on edges
+  return cav_problem_has_record(p) ? near : is_stated(p, CAV_QUANTITY_FORCE) ? priced : lost;
 }
 
 // ---------------------------------------------------------------- changes
@@ -226,13 +234,6 @@ static cav_status change(const cav_problem *p, const cav_verdict *v, cure c, cav
       break;
   }
   return CAV_OK;
-}
-
-/// Whether the problem itself has a term of the quantity.
-static int is_stated(const cav_problem *p, cav_quantity quantity) {
-  for (int i = 0; i < p->nterm; i++)
-    if (p->term[i].quantity == quantity) return 1;
-  return 0;
 }
 
 /// What differs from the problem, as it would stand in its file.
