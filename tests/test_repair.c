@@ -162,6 +162,16 @@ static void check_loops(repaired *r) {
     cav_strategy_clear(&again);
   }
   cav_strategy_clear(&once), cav_strategy_clear(&twice);
+
+  // where they cost something already, more of the actuators is kept for feedback first
+  cav_problem priced = r->problem;
+  cav_term all[] = {r->term[0], r->term[1], cav_term_cost(CAV_QUANTITY_FORCE, 1)};
+  priced.term = all, priced.nterm = 3;
+  CHECK(cav_strategy_repair(&priced, &r->stated, &lost, 0, &once, &found) == CAV_OK && found);
+  CHECK(once.effort_limit < priced.effort_limit && once.timestep == 0 && strstr(once.changed, "effort"));
+  CHECK(cav_strategy_repair(&priced, &r->stated, &lost, 1, &twice, &found) == CAV_OK && found);
+  CHECK(strstr(twice.changed, "<force") && twice.timestep == 0);
+  cav_strategy_clear(&once), cav_strategy_clear(&twice);
 }
 
 // near a record contact forces are what is looked for, and cost nothing; a residual beyond its bound has no cure
