@@ -101,26 +101,66 @@ static double borne_of(const cav_model *m, const cav_forces *forces, int knot, i
   return borne;
 }
 
-/// Bodies that are asked to be higher than at the start at a time and are, on what of them still stands on the ground.
+/// A term's window, as attributes.
+static void write_window(const cav_term *term, char *out, size_t size) {
+  const double from = fmax(term->from, 0);
+  if (term->to < 0)
+    snprintf(out, size, "from=\"%.4g\"", from);
+  else if (term->to <= from)
+    snprintf(out, size, "at=\"%.4g\"", from);
+  else
+    snprintf(out, size, "from=\"%.4g\" to=\"%.4g\"", from, term->to);
+}
+
+/// The least height that a term asks for at its begin; minus infinity where it asks for none.
+static double least_height(const cav_term *term) {
+  const int height = term->quantity == CAV_QUANTITY_SENSOR && term->sensor.type == CAV_SENSOR_FRAMEPOS &&
+                     !term->sensor.referred && (term->component < 0 || term->component == 2);
+  if (!height || (!term->target && term->use != CAV_USE_RANGE)) return -INFINITY;
+  return (term->target ? term->target[2] : 0) + (term->use == CAV_USE_RANGE ? term->lower : 0);
+}
+
+/// The knot of a term's window at which the ground bears most of a link that is higher than before; *most: how much, N.
+static int find_borne(const cav_model *m, cav_state *state, const cav_term *term, const cav_trajectory *motion,
+                      const cav_forces *forces, int link, double before, double *most) {
+  const double to = term->to < 0 ? (motion->nknot - 1) * motion->timestep : term->to;
+  int found = -1;
+  *most = 0;
+  for (int t = (int)lround(term->from / motion->timestep); t <= (int)lround(to / motion->timestep); t++) {
+    const double borne = t < motion->nknot ? borne_of(m, forces, t, link) : 0;
+    if (borne > *most && height_at(m, state, term, motion, t) > before + raised) *most = borne, found = t;
+  }
+  return found;
+}
+
+/// Bodies that are asked to be higher than at the start, later on, and are, on what of them still stands on the ground.
 static void tell_toes(FILE *out, const cav_problem *problem, const cav_trajectory *motion, const cav_forces *forces,
                       double weight) {
   const cav_model *m = problem->model;
   cav_state *state = cav_state_new(m);
   for (int i = 0, n = 0; state && i < problem->nterm && n < NAMED; i++) {
     const cav_term *term = &problem->term[i];
-    if (!asks_height(term) || term->from != term->to || !(term->from > 0)) continue;
-    const int t = (int)lround(term->from / motion->timestep),
-              link = cav_object_link(m, term->sensor.object_type, term->sensor.object);
-    if (t >= motion->nknot || link <= 0) continue;
-    const double before = height_at(m, state, term, motion, 0), borne = borne_of(m, forces, t, link);
-    if (!(term->target[2] > before + raised && height_at(m, state, term, motion, t) > before + raised)) continue;
-    if (borne < leaning * weight) continue;
+    const double wanted = least_height(term);
+    if (!isfinite(wanted) || !(term->from > 0)) continue;
+    const int link = cav_object_link(m, term->sensor.object_type, term->sensor.object);
+    if (link <= 0) continue;
+    const double before = height_at(m, state, term, motion, 0);
+    double borne;
+    const int t = wanted > before + raised ? find_borne(m, state, term, motion, forces, link, before, &borne) : -1;
+    if (t < 0 || borne < leaning * weight) continue;
     n++;
     fprintf(
         out,
         "  note: '%s' is met on the ground: at %.3g s it bears %.3g N of that body; off the ground is higher than it "
-        "reaches on its toes, or a height of the centre of mass that nothing reaches on the ground\n",
-        or_else(term->name, "a height"), term->from, borne);
+        "reaches on its toes, or ",
+        or_else(term->name, "a height"), t * motion->timestep, borne);
+    const char *body = m->body[m->link[link].body].name;
+    char window[80];
+    write_window(term, window, sizeof window);
+    if (body && *body)
+      fprintf(out, "<constraint><sensor type=\"touch\" body=\"%s\" upper=\"0\" %s/></constraint>\n", body, window);
+    else
+      fputs("a height of the centre of mass that nothing reaches on the ground\n", out);
   }
   cav_state_free(state);
 }
@@ -246,14 +286,9 @@ static double gap_of(const cav_model *m, cav_state *state, int link, const doubl
 /// What has a link bear a tenth of the weight: a touch sensor of its body over the time of a term, if that has a name.
 static void tell_bearing(FILE *out, const cav_model *m, const cav_term *term, int link, double weight) {
   const char *body = or_else(m->body[m->link[link].body].name, "");
-  const double force = fmax(1, round(0.1 * weight)), from = fmax(term->from, 0);
+  const double force = fmax(1, round(0.1 * weight));
   char window[80];
-  if (term->to < 0)
-    snprintf(window, sizeof window, "from=\"%.4g\"", from);
-  else if (term->to <= from)
-    snprintf(window, sizeof window, "at=\"%.4g\"", from);
-  else
-    snprintf(window, sizeof window, "from=\"%.4g\" to=\"%.4g\"", from, term->to);
+  write_window(term, window, sizeof window);
   if (!*body)
     fputs("where it is to rest there a target lower by more than that, and a smaller within, press it down\n", out);
   else
