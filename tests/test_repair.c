@@ -164,12 +164,12 @@ static void check_loops(repaired *r) {
   cav_strategy_clear(&once), cav_strategy_clear(&twice);
 
   // where they cost something already, more of the actuators is kept for feedback first
-  cav_problem priced = r->problem;
+  cav_problem with_force = r->problem;
   cav_term all[] = {r->term[0], r->term[1], cav_term_cost(CAV_QUANTITY_FORCE, 1)};
-  priced.term = all, priced.nterm = 3;
-  CHECK(cav_strategy_repair(&priced, &r->stated, &lost, 0, &once, &found) == CAV_OK && found);
-  CHECK(once.effort_limit < priced.effort_limit && once.timestep == 0 && strstr(once.changed, "effort"));
-  CHECK(cav_strategy_repair(&priced, &r->stated, &lost, 1, &twice, &found) == CAV_OK && found);
+  with_force.term = all, with_force.nterm = 3;
+  CHECK(cav_strategy_repair(&with_force, &r->stated, &lost, 0, &once, &found) == CAV_OK && found);
+  CHECK(once.effort_limit < with_force.effort_limit && once.timestep == 0 && strstr(once.changed, "effort"));
+  CHECK(cav_strategy_repair(&with_force, &r->stated, &lost, 1, &twice, &found) == CAV_OK && found);
   CHECK(strstr(twice.changed, "<force") && twice.timestep == 0);
   cav_strategy_clear(&once), cav_strategy_clear(&twice);
 }

@@ -68,7 +68,7 @@ static const cure *cures_of(const cav_problem *p, const cav_verdict *v) {
   static const cure forces[] = {EFFORT, STEP, NONE}, deep[] = {SOFTNESS, STEP, NONE}, between[] = {STEP, NONE},
                     turned[] = {ORDER, STEP, NONE}, slip[] = {SMOOTHING, SLIP, SOFTNESS},
                     rub[] = {SELF, SMOOTHING, SLIP}, limbs[] = {CLOSER, SELF, STEP}, hover[] = {GAP, SMOOTHING, STEP},
-                    fold[] = {SLIDING, STEP, NONE}, lost[] = {FORCE, STEP, SLACK}, priced[] = {SLACK, FORCE, STEP},
+                    fold[] = {SLIDING, STEP, NONE}, lost[] = {FORCE, STEP, SLACK}, with_force[] = {SLACK, FORCE, STEP},
                     target[] = {EFFORT, ANEW, GOALS}, close[] = {BIT, EFFORT, GOALS}, fades[] = {SMOOTHING, GAP, STEP},
                     near[] = {STEP, SLACK, NONE}, again[] = {STEP, SLIDING, NONE}, off_slip[] = {OFF, SMOOTHING, SLIP},
                     off_hover[] = {OFF, GAP, SMOOTHING}, ground[] = {STEP, LOOSE, SOFTER}, none[] = {NONE};
@@ -91,7 +91,7 @@ static const cure *cures_of(const cav_problem *p, const cav_verdict *v) {
   if (v->replay_step_max_error > CAV_TOLERANCE_STEP) return cav_problem_has_record(p) ? again : fold;
   if (v->residual_fraction_max > v->residual_within) return none;
   // where forces cost something feedback has too little left, rather than standing on edges
-  return cav_problem_has_record(p) ? near : is_stated(p, CAV_QUANTITY_FORCE) ? priced : lost;
+  return cav_problem_has_record(p) ? near : is_stated(p, CAV_QUANTITY_FORCE) ? with_force : lost;
 }
 
 // ---------------------------------------------------------------- changes
