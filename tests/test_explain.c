@@ -342,7 +342,7 @@ static void check_range(void) {
   cav_problem_free(p);
 }
 
-// the high kick with its height as a constraint, and 3 cm higher
+// the high kick with its height as a constraint, and 3 cm lower
 static void check_kick(void) {
   cav_error error = {0};
   cav_problem *p = cav_problem_load(CAVORT_SOURCE_ROOT "/problems/motions/kick/problem.xml", NULL, &error);
@@ -356,12 +356,12 @@ static void check_kick(void) {
   if (height >= 0 && term) {
     p->timestep = p->duration / 30; // so that it takes seconds
     cav_problem moved = *p;
-    double target[3] = {0, 0, p->term[height].target[2] + 0.03};
+    double target[3] = {0, 0, p->term[height].target[2] - 0.03};
     p->term[height].use = CAV_USE_EQUAL;
     memcpy(term, p->term, sizeof *term * (size_t)p->nterm);
     term[height].target = target;
     moved.term = term;
-    compare_prices(p, &moved, CAV_BINDING_TERM, 0.03);
+    compare_prices(p, &moved, CAV_BINDING_TERM, -0.03);
   }
   free(term);
   cav_problem_free(p);

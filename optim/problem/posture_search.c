@@ -28,8 +28,8 @@ void cav_posture_clip(const cav_model *m, double *q) {
   for (int j = 0; j < m->njoint; j++) {
     const cav_joint *joint = &m->joint[j];
     kept_range(joint, range);
-    // a door stays as it is
-    if (!m->link[m->link[joint->link].root].driven) continue;
+    // a door stays as it is, where something else is driven
+    if (m->nu > 0 && !m->link[m->link[joint->link].root].driven) continue;
     if (joint->type == CAV_JOINT_HINGE || joint->type == CAV_JOINT_SLIDE)
       q[joint->q] = fmin(fmax(q[joint->q], range[0]), range[1]);
   }
