@@ -489,6 +489,8 @@ static void check_bands(void) {
     CHECK(held->use == CAV_USE_RANGE && held->lower == -.1 && held->upper == .1);
     CHECK(slow->use == CAV_USE_RANGE && slow->lower == -1 && slow->upper == 1);
     CHECK(exact->use == CAV_USE_EQUAL);
+    CHECK(cav_term_is_band(stays) && cav_term_is_band(held) && cav_term_is_band(slow));
+    CHECK(!cav_term_is_band(near) && !cav_term_is_band(about) && !cav_term_is_band(exact));
     cav_error error = {0};
     if (again || !CHECK(cav_problem_write(copy_path, p, NULL, &error) == CAV_OK)) break;
     cav_problem_free(p);

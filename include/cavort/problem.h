@@ -465,6 +465,9 @@ CAV_API double cav_joint_stop(const cav_joint *joint);
 /// (> 0); infinite: any, as of running costs, and of what is known of a free start beside a record.
 CAV_API double cav_term_tolerance(const cav_problem *problem, const cav_term *term, double usual);
 
+/// Whether a term's bounds are a tolerance of its target: as far below that as above, and finite.
+CAV_API int cav_term_is_band(const cav_term *term);
+
 /// Reads a problem file and its model (model_path overrides the file's; NULL: as written). NULL on failure.
 /// The result and its model are freed by cav_problem_free.
 CAV_API cav_problem *cav_problem_load(const char *path, const char *model_path, cav_error *error);

@@ -127,6 +127,11 @@ static int is_goal(const cav_problem *problem, const cav_term *term) {
   return term->from == term->to || (!whole && term->nwaypoint == 0 && (term->target || posture));
 }
 
+int cav_term_is_band(const cav_term *term) {
+  const int targeted = term->quantity != CAV_QUANTITY_SENSOR || term->target;
+  return term->use == CAV_USE_RANGE && targeted && isfinite(term->upper) && term->lower == -term->upper;
+}
+
 double cav_term_tolerance(const cav_problem *problem, const cav_term *term, double usual) {
   if (term->within > 0) return term->within;
   if (term->use != CAV_USE_COST) return CAV_TOLERANCE_CONSTRAINT * term->scale;

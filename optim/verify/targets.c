@@ -185,10 +185,12 @@ static void make_coordinate(const cav_verification *verification, const cav_term
 // keeps knot t if the term is missed more there than at any knot before
 static void note_target(const cav_verification *verification, const cav_term *term, int t, int n, const double *x,
                         const double *target, cav_term_report *r) {
-  int vector = term->quantity == CAV_QUANTITY_SENSOR && n > 1, worst = 0;
+  // of a band about the target each component counts
+  const int band = cav_term_is_band(term);
+  int vector = term->quantity == CAV_QUANTITY_SENSOR && n > 1 && !band, worst = 0;
   double square = 0, most = -1, wanted;
   for (int k = 0; k < n; k++) {
-    double miss = fabs(miss_of(term, x[k], target[k], &wanted));
+    double miss = fabs(band ? x[k] - target[k] : miss_of(term, x[k], target[k], &wanted));
     square += miss * miss;
     if (!(miss <= most)) most = miss, worst = k;
   }
@@ -198,13 +200,14 @@ static void note_target(const cav_verification *verification, const cav_term *te
   r->off = off;
   r->got = x[worst];
   miss_of(term, x[worst], target[worst], &r->wanted);
+  if (band) r->wanted = target[worst];
   make_coordinate(verification, term, t, worst, r);
-  const int several = term->quantity == CAV_QUANTITY_SENSOR && term->component < 0 && term->sensor.dim > 1;
+  const int several = vector && term->component < 0 && term->sensor.dim > 1;
   const double alone = fabs(r->got - r->wanted);
   r->off_alone = several && alone < all_of_it * off ? alone : off;
   r->time = t * verification->h;
   describe(verification->model, term, worst, r, &usual);
-  r->within = cav_term_tolerance(verification->problem, term, usual);
+  r->within = (band ? term->upper : 0) + cav_term_tolerance(verification->problem, term, usual);
 }
 
 // values that a term has at a knot, as they are compared; those of contacts and records have no target

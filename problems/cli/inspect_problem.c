@@ -125,7 +125,7 @@ static void print_standing(const cav_problem *p, const cav_term *term) {
            p->duration - p->timestep);
     return;
   }
-  for (int i = 0; i < n && i < 4; i++)
+  for (int i = 0; i < n && i < 4 && !cav_term_is_band(term); i++)
     printf("%s %g%s%s", i ? "," : "; to be met within", tolerance[i].within, *tolerance[i].unit ? " " : "",
            tolerance[i].unit);
   if (n && term->use == CAV_USE_COST && !(term->within > 0)) printf(" (usual)");
