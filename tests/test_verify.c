@@ -168,6 +168,44 @@ static void test_push(void) {
   CHECK(verify(&s, NULL, NULL) == CAV_OK);
   CHECK_NEAR(s.verdict.push_survived_n_s, 0.024 * 2 * 9.81, 1e-12);
   sample_free(&s);
+  // a spring brings it back along x, and nothing along y
+  s = sample_new(
+      "<mujoco><option gravity='0 0 0'/><worldbody><body><joint name='x' type='slide' axis='1 0 0' "
+      "stiffness='200' damping='20'/><joint name='y' type='slide' axis='0 1 0'/><geom size='0.1' mass='2'/>"
+      "</body></worldbody></mujoco>",
+      150, 0.02, CAV_ORDER_EULER);
+  CHECK(verify(&s, NULL, NULL) == CAV_OK);
+  CHECK_NEAR(s.verdict.push_survived_n_s, 0.024 * 2 * 9.81, 1e-12);
+  sample_free(&s);
+  // after 25 and 27 of three times so many s the least push has taken it 0.49 and 0.53 m away
+  for (int lost = 0; lost < 2; lost++) {
+    s = sample_new(
+        "<mujoco><option gravity='0 0 0'/><worldbody><body><joint name='x' type='slide' axis='1 0 0'/>"
+        "<geom size='0.1' mass='2'/></body></worldbody></mujoco>",
+        lost ? 270 : 250, 0.1, CAV_ORDER_EULER);
+    CHECK(verify(&s, NULL, NULL) == CAV_OK && s.verdict.certified);
+    CHECK_NEAR(s.verdict.push_survived_n_s, lost ? 0 : 0.003 * 2 * 9.81, 1e-12);
+    sample_free(&s);
+  }
+}
+
+// what is measured at the knots alone is what a verification measures there, to the bit; nothing is certified by it
+static void test_knots_alone(void) {
+  sample s = sample_new(resting, 50, 0.02, CAV_ORDER_EULER);
+  for (int t = 2; t <= 50; t++) s.motion->q[7 * t] += 0.01 * t, s.motion->q[7 * t + 2] += 0.01 * sin(0.3 * t);
+  cav_trajectory_velocities(s.model, s.motion);
+  CHECK(verify(&s, NULL, NULL) == CAV_OK);
+  const cav_verdict whole = s.verdict;
+  cav_error error = {0};
+  CHECK(cav_verify_knots(&s.problem, s.motion, &s.law, &s.verdict, &error) == CAV_OK);
+  CHECK(whole.momentum_defect_rms > 0 && s.verdict.momentum_defect_rms == whole.momentum_defect_rms);
+  CHECK(whole.unactuated_force_max > 0 && s.verdict.unactuated_force_max == whole.unactuated_force_max);
+  CHECK(s.verdict.cost == whole.cost && s.verdict.duration == whole.duration);
+  CHECK(s.verdict.slip_mean_m_s == whole.slip_mean_m_s && s.verdict.penetration_max_m == whole.penetration_max_m);
+  CHECK(whole.closed_loop_seconds > 0 && s.verdict.closed_loop_seconds == 0 && !s.verdict.certified);
+  CHECK_TEXT(s.verdict.reason, "not verified");
+  CHECK(cav_verify_knots(NULL, s.motion, &s.law, &s.verdict, &error) == CAV_BAD_INPUT);
+  sample_free(&s);
 }
 
 // pushed loops go on from where the loop without a push stood, to the same bits, and from wherever they are told to
@@ -617,6 +655,7 @@ int main(void) {
   test_loop_steps();
   test_balance();
   test_push();
+  test_knots_alone();
   test_before();
   test_passage();
   test_hover();

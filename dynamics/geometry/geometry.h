@@ -105,8 +105,9 @@ int cav_hfield_prism(const cav_shape *field, int feature, cav_prism *prism);
 
 /// Contact points of one pair as it is and displaced, for differences. pair is -1 at the start.
 typedef struct cav_pair_manifolds {
-  int pair, displaced; ///< 2: rates are known in closed form, of the points as the pair is
-  int faces;           ///< points over a face of one of the two, -1: not looked for
+  int pair, displaced;
+  int closed; ///< 1: rates are in closed form, and of the points only those as the pair is are there
+  int faces;  ///< points over a face of one of the two, -1: not looked for
   cav_face_point face[CAV_FACE_POINTS];
   cav_shape a, b;
   cav_hint *hint;      ///< where the last search of the two ended, NULL: none is kept

@@ -35,7 +35,7 @@ static const cav_touch *find(const cav_touch *touch, int count, int feature) {
 
 void cav_manifolds_start(cav_pair_manifolds *m, int pair, double size, double margin, cav_hint *hint) {
   m->pair = pair;
-  m->displaced = 0;
+  m->displaced = m->closed = 0;
   m->faces = -1;
   m->size = size;
   m->margin = margin;
@@ -84,8 +84,8 @@ static void displace(cav_pair_manifolds *m, const double point[3]) {
   copy3(m->point, point);
   if (m->b.type == CAV_GEOM_BOX && m->a.type <= CAV_GEOM_CAPSULE && m->a.type != CAV_GEOM_PLANE) {
     m->count[12] = cav_segment_rates(&m->a, &m->b, margin, point, m->touch[12], m->rate);
-    m->displaced = 2;
-    if (m->count[12] >= 0) return;
+    m->displaced = m->closed = m->count[12] >= 0;
+    if (m->closed) return;
   }
   // every routine keeps to CAV_TOUCH_MAX: collide.c asserts it for the same shapes
   m->count[12] = cav_collide_shapes(&m->a, &m->b, margin, m->touch[12]);
@@ -126,8 +126,8 @@ int cav_touch_rates(cav_pair_manifolds *m, const double point[3], int feature, c
   const cav_touch *found = find(m->touch[12], m->count[12], feature);
   if (!found) return 0;
   *here = *found;
-  if (m->displaced == 2) memcpy(rate, m->rate[found - m->touch[12]], 6 * sizeof *rate);
-  for (int k = 0; k < 6 && m->displaced == 1; k++) {
+  if (m->closed) memcpy(rate, m->rate[found - m->touch[12]], 6 * sizeof *rate);
+  for (int k = 0; k < 6 && !m->closed; k++) {
     const double step = k < 3 ? ROTATION_STEP : SHIFT_STEP * m->size;
     const cav_touch *at[2];
     for (int side = 0; side < 2; side++) at[side] = find(m->touch[2 * k + side], m->count[2 * k + side], feature);

@@ -183,15 +183,15 @@ CAV_VECTOR_BODY void contact_velocities_body(cav_state *state, const double *vel
 }
 CAV_BY_VECTORS(contact_velocities, (cav_state * state, const double *velocity_now), (state, velocity_now))
 
-// where derivatives of the laws of all contacts go, NULL if memory runs out: they are found when they are asked for then
+// where derivatives of the laws of all contacts go, NULL if memory runs out: none is known then, and each is found when it is
+// asked for
 static double *laws_of(cav_state *state) {
   cav_workspace *w = state->work;
   if (state->ncontact <= w->law_room) return w->law;
-  double *larger = realloc(w->law, (size_t)w->contact_room * CAV_LAW_NUMBERS * sizeof *larger);
-  if (!larger) return NULL;
-  w->law = larger;
-  w->law_room = w->contact_room;
-  return larger;
+  free(w->law);
+  w->law = malloc((size_t)w->contact_room * CAV_LAW_NUMBERS * sizeof *w->law);
+  w->law_room = w->law ? w->contact_room : 0;
+  return w->law;
 }
 
 // all contacts: velocities, impulses, wrenches
@@ -207,7 +207,8 @@ static void contacts(const cav_model *model, cav_state *state, const double *vel
     double *hessian = law ? law + CAV_LAW_NUMBERS * i : NULL;
     if (hessian) hessian[0] = -1;
     if (i >= known && by_four && i + CAV_LANES <= state->ncontact && cav_law_four(c)) known = i + CAV_LANES;
-    if (i >= known) cav_contact_impulse(state, c, coupled, c->dim <= 3 ? hessian : NULL);
+    // that of coupled rows is of all of them together
+    if (i >= known) cav_contact_impulse(state, c, coupled, c->dim <= 3 && !coupled ? hessian : NULL);
     if (coupled) { coupled += c->dim; }
     contact_push(state, c, scale);
   }

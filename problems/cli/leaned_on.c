@@ -79,10 +79,10 @@ static double height_at(const cav_model *m, cav_state *state, const cav_term *te
   return pose.pos[2];
 }
 
-/// Whether a term asks for a height of something in the world.
-static int asks_height(const cav_term *term) {
+/// Whether a term is of a height of something in the world.
+static int is_height(const cav_term *term) {
   return term->quantity == CAV_QUANTITY_SENSOR && term->sensor.type == CAV_SENSOR_FRAMEPOS && !term->sensor.referred &&
-         (term->component < 0 || term->component == 2) && term->target;
+         (term->component < 0 || term->component == 2);
 }
 
 // m from which on something is higher than at the start
@@ -114,9 +114,7 @@ static void write_window(const cav_term *term, char *out, size_t size) {
 
 /// The least height that a term asks for at its begin; minus infinity where it asks for none.
 static double least_height(const cav_term *term) {
-  const int height = term->quantity == CAV_QUANTITY_SENSOR && term->sensor.type == CAV_SENSOR_FRAMEPOS &&
-                     !term->sensor.referred && (term->component < 0 || term->component == 2);
-  if (!height || (!term->target && term->use != CAV_USE_RANGE)) return -INFINITY;
+  if (!is_height(term) || (!term->target && term->use != CAV_USE_RANGE)) return -INFINITY;
   return (term->target ? term->target[2] : 0) + (term->use == CAV_USE_RANGE ? term->lower : 0);
 }
 
@@ -305,7 +303,7 @@ static void tell_hovering(FILE *out, const cav_problem *problem, const cav_traje
   cav_state *state = cav_state_new(m);
   for (int i = 0, n = 0; state && i < problem->nterm && n < NAMED; i++) {
     const cav_term *term = &problem->term[i];
-    if (!asks_height(term)) continue;
+    if (!is_height(term) || !term->target) continue;
     const double to = term->to < 0 ? problem->duration : term->to, time = (fmax(term->from, 0) + to) / 2;
     const int t = (int)lround(time / motion->timestep),
               link = cav_object_link(m, term->sensor.object_type, term->sensor.object);
