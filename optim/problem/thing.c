@@ -34,8 +34,9 @@ static void add_term(const cav_problem *p, const cav_term *term, cav_state *stat
   if (cav_term_placed(p->model, term) != found->link || !cav_term_asks(term)) return;
   const double to = term->to < 0 ? p->duration : fmin(term->to, p->duration);
   cav_sensor_read(p->model, state, s, at);
-  if (term->use == CAV_USE_RANGE && !term->target) {
-    if (term->component == 2 && isfinite(term->lower)) found->rise = fmax(found->rise, term->lower - at[2]);
+  if (term->use == CAV_USE_RANGE && !cav_term_is_band(term)) {
+    cav_term_target(term, to, s->dim, target);
+    if (term->component == 2 && isfinite(term->lower)) found->rise = fmax(found->rise, target[2] + term->lower - at[2]);
     return;
   }
   // over a window that is where it is on the way, and the last one is where it goes
@@ -100,8 +101,8 @@ static double joint_asked(const cav_problem *p, int joint, cav_thing *found) {
     const cav_term *term = &p->term[i];
     const double to = term->to < 0 ? p->duration : fmin(term->to, p->duration);
     if (!asks_of_joint(p, term, joint, to, &target) || !cav_term_asks(term) || to < found->time) continue;
-    const int bounds = term->use == CAV_USE_RANGE && term->quantity == CAV_QUANTITY_SENSOR && !term->target;
-    last = bounds ? fmin(fmax(start, term->lower), term->upper) : target;
+    const int bounds = term->use == CAV_USE_RANGE && !cav_term_is_band(term);
+    last = bounds ? fmin(fmax(start, target + term->lower), target + term->upper) : target;
     found->time = to, found->first = fmin(found->first, fmin(fmax(term->from, 0), to));
   }
   return last;

@@ -121,8 +121,9 @@ static int find_touched(const cav_problem *p, touched *found) {
   for (int i = 0; i < p->nterm; i++) {
     const cav_term *term = &p->term[i];
     if (term->quantity != CAV_QUANTITY_SENSOR || term->sensor.type != CAV_SENSOR_TOUCH) continue;
-    double target = term->lower, to = term->to < 0 ? p->duration : fmin(term->to, p->duration);
-    if (term->use != CAV_USE_RANGE || term->target) cav_term_target(term, to, 1, &target);
+    double target, to = term->to < 0 ? p->duration : fmin(term->to, p->duration);
+    cav_term_target(term, to, 1, &target);
+    if (term->use == CAV_USE_RANGE) target += term->lower;
     if (!(target > 0) || !cav_term_asks(term)) continue;
     *found = (touched){&term->sensor, fmax(term->from, 0), to};
     return 1;
@@ -137,7 +138,7 @@ static int place_asked(const cav_problem *p, const touched *t, int link, double 
     const cav_term *term = &p->term[i];
     const double to = term->to < 0 ? p->duration : term->to;
     double target[CAV_SENSOR_DIM_MAX];
-    if ((term->use == CAV_USE_RANGE && !term->target) || cav_term_placed(p->model, term) != link) continue;
+    if ((term->use == CAV_USE_RANGE && !cav_term_is_band(term)) || cav_term_placed(p->model, term) != link) continue;
     if (term->from > t->to || to < t->from) continue;
     cav_term_target(term, fmin(to, t->to), 3, target);
     for (int k = 0; k < 3; k++)

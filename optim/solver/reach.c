@@ -46,8 +46,9 @@ static int is_last(const cav_problem *p, const cav_term *term) {
 
 // whether a term says what a posture has to be at the end
 static int is_of_end(const cav_problem *p, const cav_term *term) {
-  return is_last(p, term) && term->quantity == CAV_QUANTITY_SENSOR && (term->use != CAV_USE_RANGE || term->target) &&
-         cav_term_asks(term) && cav_term_stage(term) == CAV_READS_POSITION && isfinite(cav_term_tolerance(p, term, 1));
+  return is_last(p, term) && term->quantity == CAV_QUANTITY_SENSOR &&
+         (term->use != CAV_USE_RANGE || cav_term_is_band(term)) && cav_term_asks(term) &&
+         cav_term_stage(term) == CAV_READS_POSITION && isfinite(cav_term_tolerance(p, term, 1));
 }
 
 // rows of a term, of its tolerance; how many
@@ -56,6 +57,7 @@ static int term_rows(reacher *r, const cav_term *term, double *row) {
   const cav_sensor *s = &term->sensor;
   double at[CAV_SENSOR_DIM_MAX], target[CAV_SENSOR_DIM_MAX], sign = 1, along = 0;
   const double usual = s->type == CAV_SENSOR_FRAMEPOS ? CAV_WITHIN_LENGTH : CAV_WITHIN_ANGLE;
+  const double within = fmax(cav_term_is_band(term) ? term->upper : 0, cav_term_tolerance(p, term, usual));
   cav_sensor_read(p->model, r->state, s, at);
   cav_term_target(term, p->duration, s->dim, target);
   if (s->type == CAV_SENSOR_FRAMEQUAT) {
@@ -67,7 +69,7 @@ static int term_rows(reacher *r, const cav_term *term, double *row) {
   int n = 0;
   for (int k = 0; k < s->dim; k++) {
     if (term->component >= 0 && term->component != k) continue;
-    row[n] = (fabs(sign) * target[k] - sign * at[k]) / cav_term_tolerance(p, term, usual);
+    row[n] = (fabs(sign) * target[k] - sign * at[k]) / within;
     r->off = fmax(r->off, fabs(row[n++]));
   }
   return n;
