@@ -97,7 +97,7 @@ for word in velocity posture acceleration; do
   check "$word of one joint replaces the defaults" says "$word" "a cost of it over the whole motion takes the place of the default costs of its kind, which are of all joints"
 done
 check "roots are those of things, too" says dofs "of things of the scene, too: joints are all but free joints, driven those of them in trees that an actuator moves, root_linear and root_angular"
-check "what a body is put down on" says height "on what stands in the way down, or on the solid that its centre begins over and it inside"
+check "what a body is put down on" says height "on what stands in the way down, or on the solid that it begins inside with its centre over that"
 check "principal axes of a body" says body "along its principal axes of inertia, which may be turned from its own"
 check "who has a tolerance" says within "attribute within of <sensor> <posture> <velocity> <acceleration> <effort> <power>"
 

@@ -546,8 +546,8 @@ CAV_API int cav_verdict_optimal(const cav_verdict *verdict);
 CAV_API cav_status cav_verify(const cav_problem *problem, const cav_trajectory *trajectory, const cav_options *contact,
                               const double *gain_q, const double *gain_v, cav_verdict *verdict, cav_error *error);
 
-/// What cav_verify measures at the knots and between them alone, in a fifth of the time: nothing is simulated, so nothing is
-/// certified, and the figures of simulations are 0.
+/// What cav_verify measures at the knots and between them alone, much sooner: nothing is simulated, so nothing is certified,
+/// and the figures of simulations are 0.
 CAV_API cav_status cav_verify_knots(const cav_problem *problem, const cav_trajectory *trajectory,
                                     const cav_options *contact, cav_verdict *verdict, cav_error *error);
 

@@ -95,7 +95,7 @@ static const cav_xml_element start_joint = {
   REALS("qpos", 1, 0, "rad or m", "(the model's own configuration)", "all nq coordinates to begin with, in MuJoCo's layout"), \
   TEXT("file", "(the model's own configuration)", "trajectory.csv to take a knot of, relative to this file"),          \
   WORD("knot", ends, "last", "knot of that file"),                                                                     \
-  WORD("height", heights, "keep", "floor: each tree that is free or slides upright is raised or lowered until it stands: on a plane, on what stands in the way down, or on the solid that its centre begins over and it inside; a thing on a robot, too"), \
+  WORD("height", heights, "keep", "floor: each tree that is free or slides upright is raised or lowered until it stands: on a plane, on what stands in the way down, or on the solid that it begins inside with its centre over that; a thing also on a robot"), \
   REAL("rise", 0, "m", "(0; see height)", "with height=\"floor\": so far above the plane, whatever lies between"), \
   WORD("ranges", clippings, "keep", "clip: joints are brought into their ranges first, and tendons")
 static const cav_xml_element start = {
