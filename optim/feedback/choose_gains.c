@@ -14,9 +14,10 @@
 #include "schedule.h"
 #include "verification.h"
 
-/// Contact laws of a regulator; sets that are tried at most, and how many of them before balance and room are, where those end
-/// by which none follows from the motion's own start; sets of which a push is asked.
-enum { LAWS = 2, TRIALS = 64, PLAIN = 40, FEW = 3 };
+/// Contact laws of a regulator; sets that are tried at most, of motions whose own start one follows by the BALANCE-th, else
+/// that many; how many come before balance and room do, where those motions are left that are lost early; sets of which a
+/// push is asked.
+enum { LAWS = 2, TRIALS = 120, BALANCE = 64, PLAIN = 40, FEW = 3 };
 
 /// What a regulator is made of: penalties on straying, and the fractions of the schedule whose contact laws it reckons
 /// with.
@@ -41,6 +42,9 @@ enum { SEEDS = sizeof seed / sizeof *seed, BALANCED = sizeof balanced / sizeof *
 /// End error that ends the search, m: at first a tenth of the distance at which a loop is lost, 3 cm more with each
 /// set that was tried.
 static double near_enough(int trials) { return 0.05 + 0.03 * (trials - 1); }
+
+/// Part of its duration that a motion has to be followed for by then.
+static const double lost_early = 0.85;
 
 /// Loops that have to be followed: at first the pushed ones too.
 static int enough(int trials) { return trials <= FEW ? CAV_LOOPS : CAV_LOOP_PUSHED; }
@@ -133,8 +137,14 @@ static double spread(double x, double from, double to, double middle, int near) 
   return fmin(fmax(start + part * x * (to - from), from), to);
 }
 
+/// Ranges of penalties and laws before balance and room are among what varies, and then, narrower, as what lies outside of
+/// these held hardly any of 31 motions whose gains are hard to find (METHOD.md, 8).
+static const struct range {
+  double tracking[2], rate[2], law[2];
+} wide = {{1, 100}, {1, 6}, {0.6, 1}}, narrow = {{1, 100}, {0.8, 4}, {0.72, 1}};
+
 /// Part of the later sets whose straying is that of the links alone; the most that balance counts beside it in others.
-static const double plain = 1. / 3, most_balance = 100;
+static const double plain = 0.4, most_balance = 20;
 
 /// Powers of the root of x^5 = x + 1, and of x^7 = x + 1.
 static const double of_four[] = {0.8566748838545029, 0.7338918566271259, 0.6287067210378087, 0.5385972572236101},
@@ -151,9 +161,10 @@ static set sample(const search *s, int trial) {
   double x[6] = {0};
   for (int k = 0; k < (late ? 6 : 4); k++) x[k] = fmod(0.5 + (trial - begun + 1) * step[k], 1);
   set to = {.laws = near ? best->laws : x[3] < 0.5 ? 1 : 2};
-  to.penalty.tracking = exp(spread(x[0], log(1), log(100), log(best->penalty.tracking), near));
-  to.penalty.rate = exp(spread(x[1], log(1), log(6), log(best->penalty.rate), near));
-  to.fraction[0] = spread(x[2], 0.6, 1, best->fraction[0], near);
+  const struct range *r = late ? &narrow : &wide;
+  to.penalty.tracking = exp(spread(x[0], log(r->tracking[0]), log(r->tracking[1]), log(best->penalty.tracking), near));
+  to.penalty.rate = exp(spread(x[1], log(r->rate[0]), log(r->rate[1]), log(best->penalty.rate), near));
+  to.fraction[0] = spread(x[2], r->law[0], r->law[1], best->fraction[0], near);
   to.fraction[1] = spread(x[3], 0.3, 0.9, best->fraction[1], near);
   if (!late) return to;
   to.penalty.room = near ? best->penalty.room : x[4] < 0.5;
@@ -164,7 +175,10 @@ static set sample(const search *s, int trial) {
 
 /// Whether the best is good enough, or the motion is lost.
 static int done(const search *s, int trials) {
-  if (trials >= PLAIN && s->found && s->reached.follows < CAV_LOOP_START) return 1;
+  if (s->found && s->reached.follows == CAV_LOOP_OWN) {
+    if (trials >= BALANCE) return 1;
+    if (trials >= PLAIN && s->reached.seconds < lost_early * s->at->timestep * (s->at->nknot - 1)) return 1;
+  }
   return s->found && s->reached.follows >= enough(trials) && s->reached.error <= near_enough(trials);
 }
 
