@@ -14,10 +14,12 @@
 #include "schedule.h"
 #include "verification.h"
 
-/// Contact laws of a regulator; sets that are tried at most, of motions whose own start one follows by the BALANCE-th, else
-/// that many; how many come before balance and room do, where those motions are left that are lost early; sets of which a
-/// push is asked.
-enum { LAWS = 2, TRIALS = 120, BALANCE = 64, PLAIN = 40, FEW = 3 };
+/// Contact laws of a regulator; sets of which a push is asked; sets before balance and room are among what varies.
+enum { LAWS = 2, FEW = 3, PLAIN = 40 };
+
+/// Sets that are tried at most: in all; where none so far follows from the motion's own start, PLAIN where the motion is lost
+/// early and UNHELD else.
+enum { TRIALS = 120, UNHELD = 64 };
 
 /// What a regulator is made of: penalties on straying, and the fractions of the schedule whose contact laws it reckons
 /// with.
@@ -43,7 +45,7 @@ enum { SEEDS = sizeof seed / sizeof *seed, BALANCED = sizeof balanced / sizeof *
 /// set that was tried.
 static double near_enough(int trials) { return 0.05 + 0.03 * (trials - 1); }
 
-/// Part of its duration that a motion has to be followed for by then.
+/// Part of what a loop lasts: what the best set follows for less is lost early.
 static const double lost_early = 0.85;
 
 /// Loops that have to be followed: at first the pushed ones too.
@@ -175,9 +177,10 @@ static set sample(const search *s, int trial) {
 
 /// Whether the best is good enough, or the motion is lost.
 static int done(const search *s, int trials) {
+  const cav_verification *v = &s->verification;
   if (s->found && s->reached.follows == CAV_LOOP_OWN) {
-    if (trials >= BALANCE) return 1;
-    if (trials >= PLAIN && s->reached.seconds < lost_early * s->at->timestep * (s->at->nknot - 1)) return 1;
+    const int early = s->reached.seconds < lost_early * v->periods * v->last * v->h;
+    if (trials >= (early ? PLAIN : UNHELD)) return 1;
   }
   return s->found && s->reached.follows >= enough(trials) && s->reached.error <= near_enough(trials);
 }
