@@ -158,6 +158,46 @@ static void test_steep(bench *b) {
   CHECK(unfinished > 0.5 && fabs(unfinished - steepness) < 0.05 * unfinished);
 }
 
+// a row so stiff that its weight leaves nothing of a Hessian of 1 along it: q1 + q2 = 0, and down the slope of q1 - q2 by
+// slope^2 / 4 in all. Where rows give that is found, and the row holds; else the factors hold the step back
+static void test_stiff(bench *b) {
+  const double change[2] = {-INFINITY, INFINITY}, stiff = 1e5, slope = 0.02;
+  const int nv = b->tr->nv, width = 3 * nv, t = KNOTS / 2;
+  draw(b, 0);
+  int first = 0;
+  for (int k = 0, row = 0; k < KNOTS; k++) {
+    cav_knot *knot = &b->tr->knot[k];
+    if (k == t) first = row;
+    for (int i = 0; i < knot->layout.count; i++, row++)
+      cav_quadratic_value(b->qp)[row] = 0.5 * (knot->slot[i].lower + knot->slot[i].upper);
+    memset(knot->gradient, 0, (size_t)width * sizeof(double));
+    memset(knot->hessian, 0, (size_t)(width * width) * sizeof(double));
+    for (int c = 0; c < 3; c++)
+      for (int i = 0; i < nv && cav_transcription_block(b->tr, k, c) >= 0; i++)
+        knot->hessian[(c * nv + i) * (width + 1)] = k == t && c == 1;
+    b->radius[k] = 0.1;
+  }
+  cav_knot *knot = &b->tr->knot[t];
+  const cav_slot before = knot->slot[0];
+  for (int i = 0; i < width; i++) knot->slot_row[i] = i == nv || i == nv + 1 ? stiff : 0;
+  knot->slot[0].lower = knot->slot[0].upper = cav_quadratic_value(b->qp)[first] = 0;
+  cav_quadratic_penalty(b->qp)[first] = 1e3;
+  knot->gradient[nv] = slope, knot->gradient[nv + 1] = -slope;
+  const double expected = slope * slope, gap = 1e-11 * expected;
+  for (int gives = 0; gives < 2; gives++) {
+    cav_quadratic_let_give(b->qp, gives * expected);
+    CHECK(cav_quadratic_solve(b->qp, b->radius, change, gap) == CAV_OK);
+    const double decrease = cav_quadratic_decrease(b->qp), off = cav_quadratic_prediction(b->qp)[first];
+    const double unfinished = cav_quadratic_unfinished(b->qp);
+    printf("beside a stiff row that gives %s: %.10g of the decrease, unfinished by %.2g, the row off by %.2g\n",
+           gives ? "a little" : "nothing", decrease / expected, unfinished, off);
+    if (gives) CHECK(fabs(decrease / expected - 1) < 1e-5 && fabs(unfinished) < 1e-3 && fabs(off) < 1e-9);
+    if (!gives) CHECK(fabs(unfinished) > 1e-3 || fabs(decrease / expected - 1) > 1e-3);
+  }
+  cav_quadratic_let_give(b->qp, 0);
+  knot->slot[0] = before;
+}
+
 static void test_knots(bench *b) {
   const double change[2] = {-INFINITY, INFINITY};
   int width = 3 * b->tr->nv, bent = 0;
@@ -280,6 +320,7 @@ int main(void) {
     test_knots(&b);
     test_again(&b);
     test_steep(&b);
+    test_stiff(&b);
     test_sum(&b);
     test_threads(&b);
   }

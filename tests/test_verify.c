@@ -185,6 +185,44 @@ static void test_push(void) {
       150, 0.02, 0.024);
 }
 
+// a mass of no way back, whose start is off by up to 1 mm and 10 mm/s, evenly: it ends off by that after a time, and half a
+// metre is lost
+static cav_starts_report drifts(double h) {
+  enum { LAST = 200, STARTS = 40 };
+  sample s = sample_new(
+      "<mujoco><option gravity='0 0 0'/><worldbody><body><joint name='x' type='slide' axis='1 0 0'/>"
+      "<geom size='0.1' mass='2'/></body></worldbody></mujoco>",
+      LAST, h, CAV_ORDER_EULER);
+  cav_error error = {0};
+  cav_starts_report report;
+  CHECK(cav_verify_starts(&s.problem, s.motion, &s.law, NULL, NULL, STARTS, &report, &error) == CAV_OK);
+  CHECK(report.starts == STARTS);
+  CHECK(cav_verify_starts(&s.problem, s.motion, &s.law, NULL, NULL, 0, &report, &error) == CAV_BAD_INPUT);
+  CHECK(strstr(error.text, "one start or more") != NULL);
+  CHECK(cav_verify_starts(&s.problem, s.motion, &s.law, NULL, NULL, STARTS, &report, &error) == CAV_OK);
+  sample_free(&s);
+  return report;
+}
+
+static void test_starts(void) {
+  const cav_starts_report held = drifts(0.1), lost = drifts(0.5);
+  // 20 s, 0.2 m; in 100 s every other one is off by more than 0.5 m, the first after 50 s
+  CHECK(held.followed == held.starts && isnan(held.soonest_lost));
+  CHECK(held.end_error_m > 0.18 && held.end_error_m <= 0.201);
+  CHECK(lost.followed > 15 && lost.followed < 25 && lost.end_error_m > 0.4 && lost.end_error_m <= 0.5);
+  CHECK(lost.soonest_lost > 49 && lost.soonest_lost < 55);
+  for (int feedback = 0; feedback < 2; feedback++) {
+    sample s = sample_new(inverted, 100, 0.02, CAV_ORDER_EULER);
+    double gain_q[100], gain_v[100];
+    cav_error error = {0};
+    cav_starts_report report;
+    for (int t = 0; t < 100; t++) gain_q[t] = -30 * feedback, gain_v[t] = -5 * feedback;
+    CHECK(cav_verify_starts(&s.problem, s.motion, &s.law, gain_q, gain_v, 12, &report, &error) == CAV_OK);
+    CHECK(feedback ? report.followed == 12 && report.end_error_m < 1e-3 : report.followed < 6);
+    sample_free(&s);
+  }
+}
+
 // what is measured at the knots alone is what a verification measures there, to the bit; nothing is certified by it
 static void test_knots_alone(void) {
   sample s = sample_new(resting, 50, 0.02, CAV_ORDER_EULER);
@@ -651,6 +689,7 @@ int main(void) {
   test_loop_steps();
   test_balance();
   test_push();
+  test_starts();
   test_knots_alone();
   test_before();
   test_passage();

@@ -556,6 +556,21 @@ CAV_API cav_status cav_verify_knots(const cav_problem *problem, const cav_trajec
 CAV_API cav_status cav_verify_solution(const cav_problem *problem, const cav_solution *solution, cav_verdict *verdict,
                                        cav_error *error);
 
+/// From how many of so many starts a little off a motion's gains follow it to its end: up to 1 mm and 1 mrad of its joints,
+/// 10 mm/s and 10 mrad/s of its dofs, spread evenly, under the contacts of the model's file in steps of 2 ms. No loop of
+/// cav_verify, for which gains are chosen, has one of these starts, so this tells how far what they were chosen by carries.
+typedef struct cav_starts_report {
+  int starts;          ///< that were simulated
+  int followed;        ///< from which the motion is followed to its end
+  double soonest_lost; ///< s into the motion, of those that are lost; NaN: none is
+  double end_error_m;  ///< worst of those that follow; NaN: none does
+} cav_starts_report;
+
+/// gain_q, gain_v NULL: no feedback. CAV_BAD_INPUT: less than one start; else fails as cav_verify does.
+CAV_API cav_status cav_verify_starts(const cav_problem *problem, const cav_trajectory *trajectory,
+                                     const cav_options *contact, const double *gain_q, const double *gain_v, int starts,
+                                     cav_starts_report *report, cav_error *error);
+
 /// How optimal a verified motion is, into verdict->optimality: no step of 0.5 rad or m (root mean square over knots)
 /// along the linearised constraints decreases the cost by a larger fraction, to second order in the cost's residuals.
 /// From the knots, the problem and the multipliers of bounds among the solution's rows [nrow], which can be wrong: then

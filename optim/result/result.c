@@ -219,7 +219,7 @@ cav_status cav_result_write_verdict(const char *folder, const cav_problem *probl
   }
   if (!status) status = cav_file_begin(&file, path, error);
   if (!status) {
-    cav_certificate_json(file.stream, problem, verdict, report, provenance);
+    cav_certificate_json(file.stream, problem, verdict, report, NULL, provenance);
     status = cav_file_end(&file, error);
   }
   free(path);

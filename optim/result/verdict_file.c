@@ -69,7 +69,7 @@ void cav_certificate_terms(FILE *out, const cav_problem *problem, const cav_term
 }
 
 void cav_certificate_json(FILE *out, const cav_problem *problem, const cav_verdict *v, const cav_term_report *report,
-                          const char *provenance) {
+                          const cav_starts_report *starts, const char *provenance) {
   fputs("{\n  \"problem\": ", out);
   cav_certificate_json_text(out, problem->name);
   fputs(",\n  \"model\": ", out);
@@ -121,6 +121,12 @@ void cav_certificate_json(FILE *out, const cav_problem *problem, const cav_verdi
   write_number(out, "duration", v->duration);
   write_number(out, "solve_seconds", v->solve_seconds);
   write_number(out, "iterations", isnan(v->solve_seconds) ? (double)NAN : (double)v->iterations);
+  if (starts) {
+    write_number(out, "starts", starts->starts);
+    write_number(out, "starts_followed", starts->followed);
+    write_number(out, "starts_soonest_lost_s", starts->soonest_lost);
+    write_number(out, "starts_end_error_m", starts->end_error_m);
+  }
   fputs(",\n  \"targets\": [", out);
   for (int i = 0, first = 1; report && i < problem->nterm; i++) {
     if (!report[i].has_target) continue;

@@ -6,10 +6,10 @@
 
 #include "cavort/solve.h"
 
-/// Writes the verdict as one JSON object with a line end; numbers that are not known are null. report and provenance, a
-/// JSON value as text, may be NULL: left out.
+/// Writes the verdict as one JSON object with a line end; numbers that are not known are null. report, starts and provenance,
+/// a JSON value as text, may be NULL: left out.
 void cav_certificate_json(FILE *out, const cav_problem *problem, const cav_verdict *verdict,
-                          const cav_term_report *report, const char *provenance);
+                          const cav_term_report *report, const cav_starts_report *starts, const char *provenance);
 
 /// terms.csv: one line a term.
 void cav_certificate_terms(FILE *out, const cav_problem *problem, const cav_term_report *report);

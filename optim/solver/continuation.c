@@ -111,7 +111,7 @@ int cav_run_report(void *context, double step, double radius) {
   line.unactuated = cav_transcription_unactuated(run->tr, &line.knot);
   line.violation = cav_transcription_violation(run->tr);
   line.seconds = cav_clock() - run->start;
-  line.fraction = done(run);
+  line.fraction = fmax(run->last.fraction, done(run));
   run->last = line;
   if (!run->quiet && !cav_solution_log(solution, &line)) {
     run->failed = CAV_NO_MEMORY;
@@ -130,7 +130,9 @@ int cav_run_feedback(void *context, int trial, int trials) {
   line.violation = cav_transcription_violation(run->tr);
   line.seconds = cav_clock() - run->start;
   const double *p = part[CAV_PLACE_FEEDBACK];
-  line.fraction = p[0] + (p[1] - p[0]) * (trial - 1) / trials;
+  // of a motion that is stuck gains are asked on the way
+  line.fraction =
+      run->checkpoint.place == CAV_PLACE_FEEDBACK ? p[0] + (p[1] - p[0]) * (trial - 1) / trials : run->last.fraction;
   return observed(run, &line) || cav_run_stop(run);
 }
 

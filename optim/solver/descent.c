@@ -492,7 +492,9 @@ cav_status cav_descent_measure(cav_solve_run *run, cav_descent *d, int curved) {
   if (curved) add_curvature(run, d);
   cav_programme_values(run->tr, cav_quadratic_value(d->qp));
   set_radius(run->tr, d->radius, most_radius);
+  cav_quadratic_let_give(d->qp, cav_programme_scale(run->tr));
   status = solve_model(run, d);
+  cav_quadratic_let_give(d->qp, 0);
   if (status != CAV_OK) return status;
   // a bound: what the programme decreases, and what its gap leaves open
   run->optimality = (fmax(cav_quadratic_decrease(d->qp), 0) + cav_quadratic_gap(d->qp)) / cav_programme_scale(run->tr);
@@ -512,7 +514,9 @@ cav_status cav_descent_foresee(cav_solve_run *run, cav_descent *d, double *savin
   cav_programme_values(run->tr, cav_quadratic_value(d->qp));
   set_radius(run->tr, d->next, most_radius);
   memcpy(d->offset, cav_quadratic_penalty(d->qp), bytes);
+  cav_quadratic_let_give(d->qp, cav_programme_scale(run->tr));
   status = cav_programme_solve(run, d->qp, d->next, d->kept, &d->rest, &solved);
+  cav_quadratic_let_give(d->qp, 0);
   memcpy(cav_quadratic_penalty(d->qp), d->offset, bytes);
   *saving = INFINITY;
   d->at_least = solved ? fmax(cav_quadratic_decrease(d->qp), 0) / cav_programme_scale(run->tr) : 0;

@@ -25,8 +25,12 @@ static const double boundary = 0.995, first_gap[] = {0.1, 1e3, 1e6};
 /// or beyond and was not.
 static const double resumed_gap = 1e-2, nearby = 1e-2;
 
-/// Fraction of its diagonal that is added to a matrix that has no factor, at first.
-static const double first_lift = 1e-14;
+/// Fraction of its diagonal that is added to a matrix that has no factor, at first; what that grows and falls by.
+static const double first_lift = 1e-14, lift_step = 100;
+
+/// The most that a row which gives may weigh, over the cost: its square's rounding is then a thousandth of the cost for a
+/// step of 1.
+static const double most_weight = 1e13;
 
 enum { STARTS = sizeof first_gap / sizeof *first_gap };
 
@@ -38,7 +42,7 @@ typedef struct side {
   double s, e, y, z; ///< z: penalty less y. y 0: there is no such side
   double ds, de, dy; ///< step
   double off;        ///< s less e, over d: of a start that does not hold them to it
-  double w;          ///< 1 / (s/y + e/z)
+  double w;          ///< 1 / (s/y + e/z + g)
 } side;
 
 struct cav_quadratic {
@@ -48,6 +52,7 @@ struct cav_quadratic {
   side *row;                              ///< [2*rows] lower, upper
   side *box;                              ///< [2*n]
   double *penalty, *value, *multiplier;   ///< [rows]
+  double *give;                           ///< [rows] g: what a row gives for a unit of its multiplier
   double *change, *weight, *ray;          ///< [rows] J dx; w of both sides; right-hand side
   int *entries;                           ///< [rows*(SPARSE+1)] of a row: how many are not zero and their columns; or 0
   double *x, *dx, *rhs, *gradient, *work; ///< [n]
@@ -60,6 +65,7 @@ struct cav_quadratic {
   double *product;     ///< where that goes
   double *costs;       ///< normal equations of the costs alone, as they are kept
   double lifted;       ///< fraction of its diagonal that the last factor needed besides
+  double gives;        ///< what the weights of rows that give are told by, a cost; 0: none does
   int is_band;         ///< whether all unknowns are one, which is factored as it is gathered
   int bent;            ///< iterations whose matrix was far from positive definite
   double predicted;    ///< decrease of the last solution
@@ -90,7 +96,7 @@ cav_quadratic *cav_quadratic_new(const cav_transcription *tr, cav_normal *normal
   p->locals = malloc((knots * local + rooms + triangles) * sizeof(double));
   p->row = calloc(2 * rows + 1, sizeof *p->row);
   p->box = calloc(2 * n, sizeof *p->box);
-  p->penalty = calloc(6 * rows + 7 * n + 2 * local + 9 * nv * nv, sizeof(double));
+  p->penalty = calloc(7 * rows + 7 * n + 2 * local + 9 * nv * nv, sizeof(double));
   p->entries = malloc((rows + 1) * (SPARSE + 1) * sizeof(int));
   p->costs = malloc(cav_normal_room(normal) * sizeof(double));
   if (!p->first || !p->row || !p->box || !p->penalty || !p->entries || !p->costs || !p->locals) {
@@ -98,9 +104,9 @@ cav_quadratic *cav_quadratic_new(const cav_transcription *tr, cav_normal *normal
     return NULL;
   }
   double *next = p->penalty + rows;
-  double **const of_rows[] = {&p->value, &p->multiplier, &p->change, &p->weight, &p->ray};
+  double **const of_rows[] = {&p->value, &p->multiplier, &p->give, &p->change, &p->weight, &p->ray};
   double **const of_unknowns[] = {&p->x, &p->dx, &p->rhs, &p->gradient, &p->work};
-  for (int i = 0; i < 5; i++) *of_rows[i] = next, next += rows;
+  for (int i = 0; i < 6; i++) *of_rows[i] = next, next += rows;
   for (int i = 0; i < 5; i++) *of_unknowns[i] = next, next += n;
   p->bound = next, next += 2 * n;
   p->local = next, next += local;
@@ -124,6 +130,7 @@ double *cav_quadratic_penalty(cav_quadratic *p) { return p->penalty; }
 double *cav_quadratic_value(cav_quadratic *p) { return p->value; }
 int cav_quadratic_rows(const cav_quadratic *p) { return p->rows; }
 double cav_quadratic_gap(const cav_quadratic *p) { return p->gap; }
+void cav_quadratic_let_give(cav_quadratic *p, double scale) { p->gives = scale; }
 
 double cav_quadratic_length(const cav_quadratic *p) {
   double most = 0;
@@ -398,8 +405,8 @@ static void advance(cav_quadratic *p, double length) {
       side *z = &p->row[2 * r + k];
       if (z->y == 0) continue;
       z->s += length * z->ds, z->e += length * z->de, z->y += length * z->dy, z->z -= length * z->dy;
-      z->off *= 1 - length;
-      z->w = z->y * z->z / (z->s * z->z + z->e * z->y);
+      z->off = (1 - length) * z->off + length * p->give[r] * z->dy;
+      z->w = z->y * z->z / (z->s * z->z + z->e * z->y + p->give[r] * z->y * z->z);
       p->multiplier[r] += k ? z->y : -z->y;
       p->gap += z->s * z->y + z->e * z->z;
     }
@@ -532,10 +539,11 @@ int cav_quadratic_knot_convex(cav_quadratic *p, int t, double shift) {
 static cav_status factor(cav_quadratic *p) {
   for (int r = 0; r < p->rows; r++) p->weight[r] = p->row[2 * r].w + p->row[2 * r + 1].w;
   for (int j = 0; j < p->n; j++) p->work[j] = p->box[2 * j].w + p->box[2 * j + 1].w;
-  double shift = p->lifted > 0 ? fmax(p->lifted / 100, first_lift) : 0;
+  double shift = p->lifted / lift_step;
+  if (shift < first_lift) shift = p->lifted > 0 && p->gives == 0 ? first_lift : 0;
   cav_status status = factor_sum(p, shift, 0);
   for (p->lifted = shift; status == CAV_NOT_CONVERGED && shift < 10; p->lifted = shift) {
-    shift = shift > 0 ? 100 * shift : first_lift;
+    shift = shift > 0 ? lift_step * shift : first_lift;
     status = factor_sum(p, shift, 1);
   }
   // which rows and costs there are, and so what they join, stays as it is until another linearisation
@@ -553,11 +561,11 @@ static inline double push_of(const side *z, double mu, int second) {
 }
 
 /// Newton's step of the rows' sides, once J dx is known.
-static inline void step_side(side *z, double dd, double mu, int second) {
+static inline void step_side(side *z, double dd, double give, double mu, int second) {
   double product = second ? z->de * z->dy : 0;
   z->dy = z->w * (push_of(z, mu, second) - dd);
   z->de = (mu + product + z->e * z->dy) / z->z - z->e;
-  z->ds = dd + z->de - z->off;
+  z->ds = dd + z->de - z->off + give * z->dy;
 }
 
 /// Newton's step to where all complementarities are 0, or where second is 1, with the products of that step, mu; rhs
@@ -579,8 +587,8 @@ static void step(cav_quadratic *p, double mu, int second) {
   rows_times(p, p->dx, p->change);
   for (int r = 0; r < p->rows; r++) {
     side *z = &p->row[2 * r];
-    if (z[0].y != 0) step_side(&z[0], p->change[r], mu, second);
-    if (z[1].y != 0) step_side(&z[1], -p->change[r], mu, second);
+    if (z[0].y != 0) step_side(&z[0], p->change[r], p->give[r], mu, second);
+    if (z[1].y != 0) step_side(&z[1], -p->change[r], p->give[r], mu, second);
   }
   for (int j = 0; j < 2 * p->n; j++) {
     side *z = &p->box[j];
@@ -625,6 +633,17 @@ static double gap_after(const cav_quadratic *p, double length) {
   return gap;
 }
 
+/// What rows give in this programme.
+static void find_gives(cav_quadratic *p) {
+  memset(p->give, 0, (size_t)p->rows * sizeof(double));
+  const int width = 3 * p->tr->nv;
+  for (int t = 0; p->gives > 0 && t < p->tr->nknot; t++)
+    for (int i = 0; i < p->tr->knot[t].layout.count; i++) {
+      const double *row = p->tr->knot[t].slot_row + (size_t)i * (size_t)width;
+      p->give[p->first[t] + i] = dot(width, row, row) / (most_weight * p->gives);
+    }
+}
+
 /// Iterations from the start with a gap; *left: what is left of the first dual residual. Ends early where steps come to
 /// nothing, as they do from a start that lies too near to the bounds for the residual that it has.
 static cav_status approach(cav_quadratic *p, double tolerance, double *left) {
@@ -665,6 +684,7 @@ static cav_status approach(cav_quadratic *p, double tolerance, double *left) {
 static cav_status solve_from(cav_quadratic *p, int again, double tolerance) {
   double scale = fmax(cav_transcription_cost(p->tr), tolerance), left = 1;
   cav_status status = CAV_NOT_CONVERGED;
+  find_gives(p);
   for (int i = again ? -1 : 0; i < STARTS && status == CAV_NOT_CONVERGED; i++) {
     if (i < 0)
       start_again(p, fmax(resumed_gap * p->predicted, 1e2 * tolerance));

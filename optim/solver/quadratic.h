@@ -24,6 +24,10 @@ cav_status cav_quadratic_solve(cav_quadratic *quadratic, const double *radius, c
 /// Same results as cav_quadratic_solve.
 cav_status cav_quadratic_solve_again(cav_quadratic *quadratic, double gap);
 
+/// Whether programmes after this are solved so well that their value can be trusted, in up to twice the iterations: rows
+/// give on the way to the solution, so that the Hessian keeps its digits beside them. scale: the cost, 0: not.
+void cav_quadratic_let_give(cav_quadratic *quadratic, double scale);
+
 /// Further step from the solution x, in the metric that it was found in, towards rows that are off by offset [rows], and
 /// forces that are off by force [nknot*nv] as the costs of efforts weigh them (NULL: rows alone). Writes x [unknowns].
 void cav_quadratic_correct(cav_quadratic *quadratic, const double *offset, const double *force, double *x);

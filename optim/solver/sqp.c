@@ -27,7 +27,7 @@ static const double brisk = 0.5, sluggish = 0.03, doubtful = 0.01, left_alone = 
 
 /// Part of what may be left to be saved: one look that finds no more ends a run whose iterations gain less than that each,
 /// however fast it converges.
-static const double near_end = 0.1;
+static const double near_end = 0.25;
 
 /// What may be left to be saved on the way, a fraction of the cost.
 static const double soft_optimality = 2e-3;

@@ -1,5 +1,5 @@
 /// The closed loops of a motion under its gains: those that a certificate asks for, the same and two small pushes for the
-/// choice of gains, and the largest push that a certified motion survives. One loop: replay.c.
+/// choice of gains, the largest push that a certified motion survives, and starts that none of these has. One loop: replay.c.
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -128,4 +128,27 @@ cav_status cav_closed_loops_certify(const cav_verification *verification, const 
     status = cav_closed_loop(verification, CAV_LOOP_CLAIMED, gain_q, gain_v, NULL, &replay->closed);
   if (status != CAV_OK) return status;
   return cav_closed_loops_own(verification, known, gain_q, gain_v, &replay->own);
+}
+
+cav_status cav_verify_starts(const cav_problem *problem, const cav_trajectory *trajectory, const cav_options *contact,
+                             const double *gain_q, const double *gain_v, int starts, cav_starts_report *report,
+                             cav_error *error) {
+  *report = (cav_starts_report){.soonest_lost = NAN, .end_error_m = NAN};
+  if (starts < 1) return cav_verification_fail(error, CAV_BAD_INPUT, "expected one start or more, got %d", starts);
+  cav_verification verification;
+  cav_status status = cav_closed_loops_begin(&verification, problem, trajectory, contact, error);
+  for (int i = 0; i < starts && status == CAV_OK; i++) {
+    const cav_disturbance off = {.start = CAV_STARTS + 1 + i};
+    struct cav_follow follow;
+    status = cav_replay_own(&verification, 0, gain_q, gain_v, &off, &follow);
+    if (status != CAV_OK) break;
+    report->starts++;
+    report->followed += !*follow.lost;
+    if (*follow.lost)
+      report->soonest_lost = fmin(report->soonest_lost, follow.seconds);
+    else
+      report->end_error_m = fmax(report->end_error_m, follow.error);
+  }
+  cav_verification_end(&verification);
+  return status;
 }

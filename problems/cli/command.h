@@ -44,6 +44,7 @@ typedef struct cav_command_line {
   int jobs;            ///< -j: problems at once, 0: as many as processors
   int csv;             ///< --csv
   int errors;          ///< --errors
+  int starts;          ///< --starts, 0: none
   int nset;            ///< --set, any number of times
   char *set[CAV_COMMAND_SETTINGS];
   double duration;            ///< --duration, s; 0: by the pushes

@@ -223,7 +223,7 @@ static int save(void *context, const cav_problem *problem, const cav_solution *s
   if (!status && line->errors && !stopped)
     cav_command_write_errors(to->folder, problem, solution->trajectory, &solution->contact, solution->nrow,
                              solution->row);
-  if (!status && line->json) cav_certificate_json(stdout, problem, verdict, terms, origin);
+  if (!status && line->json) cav_certificate_json(stdout, problem, verdict, terms, NULL, origin);
   int told = !line->quiet && !line->json && !stopped;
   if (!status)
     status = cav_command_tell_records(to->folder, told, problem, solution->trajectory, &solution->contact, &error);

@@ -23,24 +23,41 @@ static cav_status certify(const cav_result *result, cav_verdict *verdict, cav_er
   return status;
 }
 
+static void tell_starts(const cav_starts_report *r) {
+  printf(
+      "from %d of %d starts up to 1 mm, 1 mrad, 10 mm/s and 10 mrad/s off, none of which gains were chosen by, the "
+      "motion is "
+      "followed",
+      r->followed, r->starts);
+  if (r->followed > 0) printf(", to %.3g mm at the end", 1e3 * r->end_error_m);
+  if (r->followed < r->starts) printf("; lost from %.2g s on", r->soonest_lost);
+  putchar('\n');
+}
+
 int cav_command_verify(const cav_command_line *line) {
   cav_error error = {0};
   cav_verdict verdict;
+  cav_starts_report starts;
   cav_result *result = cav_result_read(line->operand, line->model, &error);
   if (!result) return cav_command_fail(&error);
   cav_status status = certify(result, &verdict, &error);
+  if (!status && line->starts > 0)
+    status = cav_verify_starts(result->problem, result->trajectory, &result->problem->contact, result->gain_q,
+                               result->gain_v, line->starts, &starts, &error);
   cav_term_report *terms = status ? NULL : calloc((size_t)result->problem->nterm + 1, sizeof *terms);
   if (terms)
     status = cav_terms_report(result->problem, result->trajectory, &result->problem->contact, terms, NULL, &error);
   if (!status && line->errors)
     cav_command_write_errors(line->operand, result->problem, result->trajectory, &result->problem->contact,
                              result->nrow, result->row);
-  if (!status && line->json) cav_certificate_json(stdout, result->problem, &verdict, terms, NULL);
+  if (!status && line->json)
+    cav_certificate_json(stdout, result->problem, &verdict, terms, line->starts > 0 ? &starts : NULL, NULL);
   if (!status && !line->json && !line->quiet)
     status = cav_command_tell_records(NULL, 1, result->problem, result->trajectory, &result->problem->contact, &error);
   if (!status && !line->json && !line->quiet) {
     cav_command_tell_stopped(stdout, line->operand);
     cav_certificate_print(stdout, result->problem, &verdict, terms);
+    if (line->starts > 0) tell_starts(&starts);
     cav_command_tell_tried(stdout, line->operand);
     if (verdict.certified)
       cav_command_tell_leaning(stdout, result->problem, result->trajectory, &result->problem->contact);

@@ -40,7 +40,8 @@ enum option {
   OPTION_CONTROL = 33554432,
   OPTION_ERRORS = 67108864,
   OPTION_SCALE = 134217728,
-  OPTION_MASS = 268435456
+  OPTION_MASS = 268435456,
+  OPTION_STARTS = 536870912
 };
 
 #define SOLVER_NAME(solver, name, ...) "|" #name
@@ -94,6 +95,8 @@ static const cav_manual_option options[] = {
      "values (=0.2,0.3,0.4), each is solved, of several --set all combinations"},
     {OPTION_ERRORS, "--errors", NULL, NULL,
      "write stderr.csv: standard errors of what was estimated, with costs as likelihoods"},
+    {OPTION_STARTS, "--starts", NULL, "N",
+     "from how many of so many starts a little off, none of which the gains were chosen by, the motion is followed"},
     {OPTION_CSV, "--csv", NULL, NULL, "print as CSV"},
     {OPTION_LIKE, "--like", NULL, "MOTION",
      "as this motion of the project asks, or this problem file, where the model has what it names"},
@@ -142,7 +145,7 @@ static const cav_manual_command commands[] = {
      "a line for each result folder, or each problem of a batch: what became of it, and the first cause",
      cav_command_table, OPTION_CSV},
     {"verify", "DIR", "certify the motion of a result folder again, from its files alone", cav_command_verify,
-     OPTION_MODEL | OPTION_ERRORS | OPTION_QUIET | OPTION_JSON},
+     OPTION_MODEL | OPTION_ERRORS | OPTION_STARTS | OPTION_QUIET | OPTION_JSON},
     {"explain", "DIR", "say why the motion of a result folder is as it is: what it misses, and which constraints pull",
      cav_command_explain, OPTION_MODEL | OPTION_ALL | OPTION_JSON},
     {"view", "DIR|PROBLEM [DIR...]",
@@ -411,6 +414,8 @@ static int take_value(cav_command_line *line, enum option option, const char *na
       return 0;
     case OPTION_ERRORS:
       return line->errors = 1;
+    case OPTION_STARTS:
+      return take_count(name, value, 10000, &line->starts);
     case OPTION_CSV:
       return line->csv = 1;
     case OPTION_LIKE:

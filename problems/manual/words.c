@@ -59,6 +59,11 @@ static const struct {
      "key=\"stand\" of <start>, <goal>, <pose> and <waypoint> is a posture on the feet, found for any model that has "
      "feet;\n  others are found for any humanoid. height=\"floor\" beside it puts it on the floor",
      "postures"},
+    {"robust|robustness|disturbance|disturbances|perturbation|perturbations|feedback|gains",
+     "solve chooses feedback gains that follow a motion in simulations; verify DIR --starts N tells from how many "
+     "starts a\n"
+     "  little off they do, a verdict's push_survived_n_s what push; mpc --push pushes a controller",
+     "verify"},
     {"steady|wobble|wobbly|sway|swaying",
      "a trunk is kept still by a heavier cost on its turning, <velocity dofs=\"root_angular\" weight=\"2\"/>, or, "
      "before the "
