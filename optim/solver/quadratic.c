@@ -680,6 +680,13 @@ static cav_status approach(cav_quadratic *p, double tolerance, double *left) {
   return CAV_OK;
 }
 
+/// The factor for corrections, as stiff as where no row gives: what limits weights leaves rows off by a millionth.
+static cav_status stiffen(cav_quadratic *p) {
+  memset(p->give, 0, (size_t)p->rows * sizeof(double));
+  advance(p, 0);
+  return factor(p);
+}
+
 /// Solves it from the last solution, where again is 1 and that leads there, or from one start after another.
 static cav_status solve_from(cav_quadratic *p, int again, double tolerance) {
   double scale = fmax(cav_transcription_cost(p->tr), tolerance), left = 1;
@@ -700,7 +707,7 @@ static cav_status solve_from(cav_quadratic *p, int again, double tolerance) {
   p->predicted = cav_quadratic_decrease(p);
   if (status == CAV_OK && (p->lifted > 1e-10 || p->predicted < -10 * fmax(p->gap, tolerance)))
     status = CAV_NOT_CONVERGED;
-  return status;
+  return status == CAV_OK && p->gives > 0 ? stiffen(p) : status;
 }
 
 cav_status cav_quadratic_solve(cav_quadratic *p, const double *radius, const double change[2], double tolerance) {
