@@ -398,6 +398,20 @@ static int tell_moved(FILE *out, const cav_problem *p) {
   return 1;
 }
 
+/// Parts of a step that a time may be off its knot untold.
+static const double at_knot = 0.05;
+
+/// Of one time that lies between knots.
+static int tell_between(FILE *out, const cav_problem *p, const cav_term *term) {
+  const double h = p->timestep, knot = round(term->from / h) * h;
+  char name[NAME];
+  if (term->from != term->to || term->to < 0 || p->duration_most > 0) return 0;
+  if (fabs(knot - term->from) <= at_knot * h) return 0;
+  fprintf(out, "note: %s is asked for at %g s, and knots are %g s apart: it counts at %g s, the nearest\n",
+          called(p, term, name), term->from, h, knot);
+  return 1;
+}
+
 /// Of a posture that puts a free body farther than motions go.
 static int tell_far_root(FILE *out, const cav_problem *p, const double *q, const char *which) {
   for (int j = 0; j < p->model->njoint; j++) {
@@ -420,7 +434,7 @@ int cav_command_tell_units(FILE *out, const cav_problem *p) {
   for (int i = 0; i < p->nterm; i++) {
     const cav_term *term = &p->term[i];
     n += tell_degrees(out, p, term) + tell_millimetres(out, p, term) + tell_touch(out, p, term) +
-         tell_things(out, p, term);
+         tell_between(out, p, term) + tell_things(out, p, term);
   }
   return n + tell_moved(out, p);
 }

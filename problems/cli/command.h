@@ -226,8 +226,9 @@ int cav_command_tell_goal(FILE *out, const cav_problem *problem);
 /// A number without the sign of a zero, and not in digits that are rounding. asked.c.
 double cav_command_plain(double x);
 
-/// Says of numbers that are likely to be of another unit (degrees, millimetres), of a touch without a target, of roots of things
-/// that a term of roots counts, and of a thing that may have to slide or roll; their number. asked.c.
+/// Says of numbers that are likely to be of another unit (degrees, millimetres), of a touch without a target, of a time that
+/// lies between knots, of roots of things that a term of roots counts, and of a thing that may have to slide or roll; their
+/// number. asked.c.
 int cav_command_tell_units(FILE *out, const cav_problem *problem);
 
 /// Prints where surfaces of roles and things end, at the posture of the file or, of a problem, at its start. extents.c.
