@@ -223,6 +223,12 @@ check "as optimal from the files as when it was solved" [ "$(grep '"optimality"'
 check "verify writes nothing" cmp -s before.json swing.result/verdict.json
 cp -r swing.result exacting
 sed 's#<schedule#& optimality="1e-20"#' swing.result/problem.xml >exacting/problem.xml
+run 0 verify swing.result --starts 3
+says out "from 3 of 3 starts up to 1 mm, 1 mrad, 10 mm/s and 10 mrad/s off, none of which gains were chosen by, the motion is followed"
+run 0 verify swing.result --starts 3 --json
+says out '"starts_followed": 3,'
+run 2 verify swing.result --starts none
+says err "--starts: expected a number from 1 to 10000, got 'none'"
 run 0 verify exacting
 says out "the problem asks for 1e-20 (<schedule optimality>): not reached"
 rm swing.result/view.html

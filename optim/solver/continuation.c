@@ -195,6 +195,8 @@ cav_status cav_kinematics_run(cav_solve_run *run) {
   cav_stage_options stage = cav_schedule_at(&run->problem->schedule, 0);
   int begin = run->solution->iterations;
   run->phase = "kinematics";
+  // begun again: what was done is no part of it
+  run->last.fraction = 0;
   run->stage = 1;
   run->stages = run->problem->schedule.stages;
   cav_stage_set(run->problem, 0, run->tr);

@@ -23,12 +23,9 @@ static cav_status certify(const cav_result *result, cav_verdict *verdict, cav_er
   return status;
 }
 
-static void tell_starts(const cav_starts_report *r) {
-  printf(
-      "from %d of %d starts up to 1 mm, 1 mrad, 10 mm/s and 10 mrad/s off, none of which gains were chosen by, the "
-      "motion is "
-      "followed",
-      r->followed, r->starts);
+static void tell_starts(const cav_starts_report *r, int gains) {
+  printf("from %d of %d starts up to 1 mm, 1 mrad, 10 mm/s and 10 mrad/s off%s the motion is followed", r->followed,
+         r->starts, gains ? ", none of which gains were chosen by," : ", without gains,");
   if (r->followed > 0) printf(", to %.3g mm at the end", 1e3 * r->end_error_m);
   if (r->followed < r->starts) printf("; lost from %.2g s on", r->soonest_lost);
   putchar('\n');
@@ -57,7 +54,7 @@ int cav_command_verify(const cav_command_line *line) {
   if (!status && !line->json && !line->quiet) {
     cav_command_tell_stopped(stdout, line->operand);
     cav_certificate_print(stdout, result->problem, &verdict, terms);
-    if (line->starts > 0) tell_starts(&starts);
+    if (line->starts > 0) tell_starts(&starts, result->gain_q != NULL);
     cav_command_tell_tried(stdout, line->operand);
     if (verdict.certified)
       cav_command_tell_leaning(stdout, result->problem, result->trajectory, &result->problem->contact);
