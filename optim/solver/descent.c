@@ -506,21 +506,34 @@ cav_status cav_descent_measure(cav_solve_run *run, cav_descent *d, int curved) {
   return CAV_OK;
 }
 
-cav_status cav_descent_foresee(cav_solve_run *run, cav_descent *d, double *saving) {
-  size_t bytes = (size_t)cav_quadratic_rows(d->qp) * sizeof(double);
+/// The programme of a look, in full boxes; its decrease and gap, over the cost, into *saving, infinite where it is not solved
+/// to its end. gives: its rows do.
+static cav_status look_ahead(cav_solve_run *run, cav_descent *d, int gives, double *saving) {
+  const double scale = cav_programme_scale(run->tr);
+  const size_t bytes = (size_t)cav_quadratic_rows(d->qp) * sizeof(double);
   int solved = 0;
-  cav_status status = cav_transcription_linearise(run->tr, run->at);
-  if (status != CAV_OK) return status;
-  cav_programme_values(run->tr, cav_quadratic_value(d->qp));
   set_radius(run->tr, d->next, most_radius);
   memcpy(d->offset, cav_quadratic_penalty(d->qp), bytes);
-  cav_quadratic_let_give(d->qp, cav_programme_scale(run->tr));
-  status = cav_programme_solve(run, d->qp, d->next, d->kept, &d->rest, &solved);
+  cav_quadratic_let_give(d->qp, gives ? scale : 0);
+  const cav_status status = cav_programme_solve(run, d->qp, d->next, d->kept, &d->rest, &solved);
   cav_quadratic_let_give(d->qp, 0);
   memcpy(cav_quadratic_penalty(d->qp), d->offset, bytes);
   *saving = INFINITY;
-  d->at_least = solved ? fmax(cav_quadratic_decrease(d->qp), 0) / cav_programme_scale(run->tr) : 0;
+  if (!gives) d->at_least = solved ? fmax(cav_quadratic_decrease(d->qp), 0) / scale : 0;
   if (solved && fabs(cav_quadratic_unfinished(d->qp)) <= unfinished)
-    *saving = (fmax(cav_quadratic_decrease(d->qp), 0) + cav_quadratic_gap(d->qp)) / cav_programme_scale(run->tr);
+    *saving = (fmax(cav_quadratic_decrease(d->qp), 0) + cav_quadratic_gap(d->qp)) / scale;
   return status;
+}
+
+cav_status cav_descent_foresee(cav_solve_run *run, cav_descent *d, double *saving) {
+  cav_status status = cav_transcription_linearise(run->tr, run->at);
+  if (status != CAV_OK) return status;
+  cav_programme_values(run->tr, cav_quadratic_value(d->qp));
+  status = look_ahead(run, d, 0, saving);
+  d->doubted = !isfinite(*saving);
+  return status == CAV_OK && d->doubted ? look_ahead(run, d, 1, saving) : status;
+}
+
+cav_status cav_descent_confirm(cav_solve_run *run, cav_descent *d, double *saving) {
+  return d->doubted ? CAV_OK : look_ahead(run, d, 1, saving);
 }

@@ -31,6 +31,7 @@ typedef struct cav_descent {
   double gain;                   ///< decrease of the step that was taken
   double asked;                  ///< what may be left to be saved, of the cost
   double at_least;               ///< what the last look found at least, finished or not
+  int doubted;                   ///< 1: it was not finished where no row gives
   double near;                   ///< what is next to nothing; 0 on the way, where a law is left soon in any case
   int screens;                   ///< 1: it is still to be asked whether a certificate would refuse the motion
   int patient;                   ///< 1: being stuck is no end, unless little is left
@@ -68,8 +69,11 @@ cav_status cav_descent_settle_rows(cav_solve_run *run, cav_descent *descent);
 cav_status cav_descent_measure(cav_solve_run *run, cav_descent *descent, int curved);
 
 /// What a step may still save, by Gauss-Newton's model of here in the full box: that of the verifier. A fraction of the
-/// cost, infinite where that is not found: the programme is not solved, or not finished, as where its factors were held. Boxes
-/// and penalties stay as they are.
+/// cost, infinite where that is not found: the programme is not solved, or not finished, even where rows give. Boxes and
+/// penalties stay as they are.
 cav_status cav_descent_foresee(cav_solve_run *run, cav_descent *descent, double *saving);
+
+/// The same once more at the same place, of rows that give, where these were not asked for it. *saving stays where they were.
+cav_status cav_descent_confirm(cav_solve_run *run, cav_descent *descent, double *saving);
 
 #endif

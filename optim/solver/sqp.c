@@ -27,7 +27,7 @@ static const double brisk = 0.5, sluggish = 0.03, doubtful = 0.01, left_alone = 
 
 /// Part of what may be left to be saved: one look that finds no more ends a run whose iterations gain less than that each,
 /// however fast it converges.
-static const double near_end = 0.25;
+static const double near_end = 0.1;
 
 /// What may be left to be saved on the way, a fraction of the cost.
 static const double soft_optimality = 2e-3;
@@ -65,6 +65,15 @@ static int hints(const cav_solve_run *run, const cav_descent *d) {
   return d->gain < little && d->predicted < little;
 }
 
+/// Asks once more, of rows that give, whether what a look takes for the end is one; where that is not finished either nothing
+/// speaks against it.
+static cav_status confirm(cav_solve_run *run, cav_descent *d, tail *end) {
+  if (!end->near && end->met < LOOKS) return CAV_OK;
+  cav_status status = cav_descent_confirm(run, d, &end->saving);
+  if (isfinite(end->saving) && end->saving > d->asked) end->near = end->met = 0;
+  return status;
+}
+
 /// Looks, every few iterations that gain little; between two such looks once where an iteration hints at an end.
 static cav_status look(cav_solve_run *run, cav_descent *d, tail *end) {
   end->saving = INFINITY;
@@ -75,13 +84,13 @@ static cav_status look(cav_solve_run *run, cav_descent *d, tail *end) {
   cav_status status = gain < d->asked ? cav_descent_foresee(run, d, &end->saving) : CAV_OK;
   end->near = end->saving <= d->near && gain < d->near;
   end->hinted = !due;
-  if (!due) return status;
+  if (!due) return status == CAV_OK ? confirm(run, d, end) : status;
   end->iterations = 0, end->gain = 0;
   end->met = end->saving <= d->asked && gain < brisk * end->saving ? end->met + 1 : 0;
   // what is not finished tells less
-  const double little = isfinite(end->saving) ? sluggish : doubtful;
+  const double little = d->doubted ? doubtful : sluggish;
   end->stuck = gain < d->asked && gain < little * d->at_least ? end->stuck + 1 : 0;
-  return status;
+  return status == CAV_OK ? confirm(run, d, end) : status;
 }
 
 /// Keeps the motion where its rows hold, or are as near as a certificate asks; until there is one, where they nearly do.
