@@ -158,8 +158,8 @@ static void test_steep(bench *b) {
   CHECK(unfinished > 0.5 && fabs(unfinished - steepness) < 0.05 * unfinished);
 }
 
-// a row so stiff that its weight leaves nothing of a Hessian of 1 along it: q1 + q2 = 0, and down the slope of q1 - q2 by
-// slope^2 / 4 in all. Where rows give that is found, and the row holds; else the factors hold the step back
+// a row so stiff that its weight leaves nothing of a Hessian of 1 along it: q1 + q2 = 0, and down along q1 - q2, by slope^2
+// in all. Where rows give that is found, and the row holds; else the factors hold the step back
 static void test_stiff(bench *b) {
   const double change[2] = {-INFINITY, INFINITY}, stiff = 1e5, slope = 0.02;
   const int nv = b->tr->nv, width = 3 * nv, t = KNOTS / 2;

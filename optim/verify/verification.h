@@ -243,7 +243,7 @@ cav_status cav_replay_closed(const cav_verification *verification, const cav_opt
 typedef struct cav_disturbance {
   int link;                    ///< 0: no impulse
   double fraction, impulse[3]; ///< N s, world
-  int start;                   ///< 1 .. CAV_STARTS: one of these; 0: the motion's own
+  int start;                   ///< 1 .. CAV_STARTS: one of the certificate's; more: others; 0: the motion's own
   struct cav_before *before;   ///< NULL, or what is kept for all impulses of one fraction under the same gains; by
                                ///< itself: it is found
 } cav_disturbance;
