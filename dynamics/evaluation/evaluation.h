@@ -10,8 +10,7 @@ struct cav_hint;
 
 /// Moves what the state's last evaluation, cav_inverse at (q, v, v_next) [nq, nv, nv], has left there to *evaluation,
 /// made where that is NULL; the state holds none then. Nothing is kept, and the state stays as it is, under options
-/// whose evaluation leaves more than this (orders of whole momenta, rows that are coupled or look ahead) or if memory
-/// runs out.
+/// whose rows are coupled, or if memory runs out.
 void cav_evaluation_keep(cav_evaluation **evaluation, cav_state *state, const double *q, const double *v,
                          const double *v_next);
 

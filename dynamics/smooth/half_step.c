@@ -28,15 +28,18 @@ static double *carve_numbers(double **at, size_t n) {
   return piece;
 }
 
-static void carve(cav_half_step *half, double sign, double **at, size_t nlink, size_t nv, size_t nq) {
-  half->sign = sign;
+// what an evaluation leaves to derivatives
+static void carve_evaluated(cav_half_step *half, double **at, size_t nlink, size_t nv) {
   half->com = carve_numbers(at, 3 * nlink);
   half->inertia = carve_numbers(at, 6 * nlink);
   half->velocity = carve_numbers(at, 6 * nlink);
   half->momentum = carve_numbers(at, 6 * nlink);
+  half->axis = carve_numbers(at, 6 * nv);
+}
+
+static void carve_scratch(cav_half_step *half, double **at, size_t nlink, size_t nv, size_t nq) {
   half->composite = carve_numbers(at, 10 * nlink);
   half->whole = carve_numbers(at, 6 * nlink);
-  half->axis = carve_numbers(at, 6 * nv);
   half->by_q = carve_numbers(at, 12 * nv);
   half->by_v = carve_numbers(at, 12 * nv);
   half->twist_q = carve_numbers(at, 6 * nv);
@@ -55,10 +58,14 @@ cav_status cav_half_steps_new(const cav_model *model, cav_state *state) {
   half_steps->before.link = (cav_pose *)(half_steps + 1);
   half_steps->after.link = half_steps->before.link + n;
   double *at = (double *)(half_steps->after.link + n);
-  carve(&half_steps->before, -1, &at, n, nv, nq);
-  carve(&half_steps->after, 1, &at, n, nv, nq);
+  half_steps->before.sign = -1, half_steps->after.sign = 1;
+  carve_evaluated(&half_steps->before, &at, n, nv);
+  carve_evaluated(&half_steps->after, &at, n, nv);
   half_steps->v = carve_numbers(&at, nv);
   half_steps->missing = carve_numbers(&at, 6 * n);
+  half_steps->evaluated = (size_t)(at - half_steps->before.com);
+  carve_scratch(&half_steps->before, &at, n, nv, nq);
+  carve_scratch(&half_steps->after, &at, n, nv, nq);
   half_steps->inner = carve_numbers(&at, 6 * n);
   assert((char *)at == (char *)half_steps + bytes);
   // the world stays where it is

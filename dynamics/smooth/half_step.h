@@ -24,6 +24,7 @@ typedef struct cav_half_step {
 typedef struct cav_half_steps {
   cav_half_step before, after;
   size_t bytes;
+  size_t evaluated; ///< numbers from before.com on that an evaluation leaves to derivatives, v and missing with them
 
   // what before is good for: the state's position, this step and this velocity
   int fresh;
