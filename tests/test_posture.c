@@ -242,6 +242,27 @@ static void check_files(const char *folder) {
   cav_problem_free(found), cav_problem_free(last), cav_problem_free(own);
 }
 
+// a posture turned is that posture seen from elsewhere: z of its root's axes and the height as before, the rest by the angle
+static void check_turn(const char *folder) {
+  cav_error error = {0};
+  cav_problem *as_it_is = load(folder, "<start key='all-fours' height='floor'/>", &error),
+              *turned = load(folder, "<start key='all-fours' height='floor'><root pos='.5 .2' turn='90'/></start>", &error);
+  if (CHECK(as_it_is && turned)) {
+    const double *p = as_it_is->q_start, *q = turned->q_start;
+    double there[9], here[9];
+    quat_matrix(there, p + 3), quat_matrix(here, q + 3);
+    CHECK_NEAR(q[0], 0.5, 0), CHECK_NEAR(q[1], 0.2, 0), CHECK_NEAR(q[2], p[2], 1e-12);
+    for (int k = 0; k < 3; k++) {
+      CHECK_NEAR(here[k], -there[3 + k], 1e-12), CHECK_NEAR(here[3 + k], there[k], 1e-12);
+      CHECK_NEAR(here[6 + k], there[6 + k], 1e-12);
+    }
+    // it does not stand upright, so that its whole orientation could not be stated as easily
+    CHECK(fabs(there[8]) < 0.5);
+    CHECK(!memcmp(p + 7, q + 7, (size_t)(as_it_is->model->nq - 7) * sizeof *p));
+  }
+  cav_problem_free(as_it_is), cav_problem_free(turned);
+}
+
 int main(void) {
   static const struct {
     const char *name;
@@ -266,6 +287,7 @@ int main(void) {
   if (shipped_path("unitree/g1/scene_29dof.xml", 1, path)) check_meshes(path);
   if (!CHECK(mkdtemp(folder) != NULL)) return check_result();
   check_files(folder);
+  check_turn(folder);
   scene_remove(folder);
   return check_result();
 }

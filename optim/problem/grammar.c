@@ -66,9 +66,10 @@ static const char *const parameters[CAV_PARAMETER_KINDS + 1] = {CAV_PARAMETERS(P
 // postures
 #define ROOT_PLACE                                                                                                     \
   TEXT("joint", "(the first free joint)", "free joint that is placed"),                                                \
-  REALS("pos", 3, 3, "m", "(as it was)", "position in the world: z is up, of most robots +x forwards and +y to the left"),                                                   \
+  REALS("pos", 2, 3, "m", "(as it was)", "position in the world: z is up, of most robots +x forwards and +y to the left; x and y alone leave the height"),                                                   \
   REALS("quat", 4, 4, "", "(as it was)", "orientation as a quaternion w x y z, brought to unit length"),               \
   REALS("euler", 3, 3, "degrees", "(as it was)", "orientation by rotations about x, then the new y, then the new z, each right-handed: 0 0 90 is turned to the left"), \
+  REALS("turn", 1, 1, "degrees", "0", "turned so far about the vertical through its origin, after all else, positive to the left: the posture stays as it is"), \
   WORD("height", heights, "floor", "keep: height=\"floor\" of the posture leaves it where it is, as a ball in the air")
 #define JOINT_PLACE(one)                                                                                               \
   NEEDED("name", "joint that is set"), REALS("pos", 1, 1, "rad or m", one, "angle of a hinge, distance of a slide"),   \

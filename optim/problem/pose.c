@@ -234,6 +234,14 @@ static int root_joint(const cav_problem_reader *reader, const cav_xml_node *node
   return -1;
 }
 
+// q turned about its own axis, or about the world's, degrees
+static void turn(double q[4], int axis, double degrees, int world) {
+  const double half = degrees * M_PI / 360;
+  double rotation[4] = {cos(half), 0, 0, 0};
+  rotation[1 + axis] = sin(half);
+  quat_mul(q, world ? rotation : q, world ? q : rotation);
+}
+
 // position and orientation of a free joint
 static cav_status lay_root(const cav_problem_reader *reader, const cav_xml_node *node, double *q) {
   const cav_model *m = reader->model;
@@ -242,21 +250,17 @@ static cav_status lay_root(const cav_problem_reader *reader, const cav_xml_node 
   if (cav_xml_get(node, "quat") && cav_xml_get(node, "euler")) {
     return cav_xml_fail(reader->error, node, "euler", "contradicts attribute 'quat'; give one of the two");
   }
-  double *at = q + m->joint[j].q, euler[3], rotation[4];
+  double *at = q + m->joint[j].q, euler[3];
   cav_xml_reals(node, "pos", at, 3);
   if (cav_xml_reals(node, "quat", at + 3, 4) && !unit(at + 3)) {
     return cav_xml_fail(reader->error, node, "quat", "expected a quaternion that is not zero");
   }
-  if (!cav_xml_reals(node, "euler", euler, 3)) return CAV_OK;
-  // degrees about x, then the new y, then the new z
-  memcpy(at + 3, (double[]){1, 0, 0, 0}, 4 * sizeof(double));
-  for (int i = 0; i < 3; i++) {
-    double half = euler[i] * M_PI / 360;
-    memset(rotation, 0, sizeof rotation);
-    rotation[0] = cos(half);
-    rotation[1 + i] = sin(half);
-    quat_mul(at + 3, at + 3, rotation);
+  if (cav_xml_reals(node, "euler", euler, 3)) {
+    // about x, then the new y, then the new z
+    memcpy(at + 3, (double[]){1, 0, 0, 0}, 4 * sizeof(double));
+    for (int i = 0; i < 3; i++) turn(at + 3, i, euler[i], 0);
   }
+  if (cav_xml_get(node, "turn")) turn(at + 3, 2, cav_xml_real(node, "turn", 0), 1);
   return CAV_OK;
 }
 

@@ -187,6 +187,9 @@ int cav_command_tell_stopped(FILE *out, const char *folder);
 /// deepest in a solid. preview.c.
 void cav_command_tell_guess(FILE *out, const cav_problem *problem, int whole);
 
+/// How a solve begins where that is not the guess of the file: what its first strategy does. preview.c.
+void cav_command_tell_begin(FILE *out, const char *indent, const cav_strategy *first);
+
 /// Tells of a step in which bodies fall far: milliseconds, perhaps, where seconds are meant. inspect.c.
 void cav_command_tell_step(FILE *out, const cav_problem *problem);
 
@@ -201,8 +204,9 @@ cav_status cav_command_print_problem(const cav_problem *problem, int all, cav_er
 int cav_command_tell_equalities(FILE *out, const cav_problem *problem);
 
 /// Prints where a posture of a problem has its centre of mass, which bodies touch the world and what is deepest in what: a line
-/// that begins with a name. all: every body that touches is named. stance.c.
-cav_status cav_command_print_stance(const cav_problem *problem, const char *name, const double *q, int all,
+/// that begins with a name, and, of what rests there, where nothing bears its centre of mass. all: every body that touches is
+/// named. stance.c.
+cav_status cav_command_print_stance(const cav_problem *problem, const char *name, const double *q, int rests, int all,
                                     cav_error *error);
 
 /// The names of the geoms of a pair, of the one that moves and of the one that it is in: where one is of the world, that. Returns

@@ -332,16 +332,7 @@ static int solve_from(const cav_command_line *line, const cav_problem *problem, 
   if (!status && race.tell) cav_command_tell_demands(stderr, problem);
   if (!status && race.tell) cav_command_tell_axes(stderr, problem);
   if (!status && race.tell) cav_command_tell_guess(stderr, problem, 0);
-  const cav_strategy *first = &race.entry[0].strategy;
-  if (!status && race.tell && (first->hand || !first->stated))
-    fprintf(stderr, "%s: begun %s\n",
-            first->hand ? "the file has no <guess>, and no term of it brings a hand to what has to be moved"
-            : first->nreach
-                ? "the file has no <goal>, and the straight way to what is asked for at the end runs into something"
-                : "the straight way from start to goal runs into a solid or the ground, or turns feet where "
-                  "they stand, and no "
-                  "waypoint of a <guess> leads otherwise",
-            first->text);
+  if (!status && race.tell) cav_command_tell_begin(stderr, "", &race.entry[0].strategy);
   if (!status) status = run_race(&race, line, &tick, &error);
   int best = status ? -1 : cav_race_best(&race, line->strategies > 1), done = CAV_EXIT_INTERNAL;
   if (best >= 0 && race.tell && !interrupted && !cav_race_success(&race.entry[best].report)) tell_cause(&race);

@@ -49,6 +49,7 @@ typedef struct table {
   const cav_model *model;
   cav_state *state;
   const char *when;
+  int moved; ///< 1: without what is fixed to the world
   int rows;
 } table;
 
@@ -83,25 +84,32 @@ static void print_things(table *t, const cav_roles *roles) {
     const int fixed = m->body[b].link == 0;
     int told = !fixed && (link->driven || link->body != b);
     for (cav_role r = 0; r < CAV_ROLE_TYPES; r++) told |= roles->body[r] == b;
-    if (!told) print_row(t, m->body[b].name, b, -1, fixed ? "fixed to the world" : "");
+    if (!told && !(fixed && t->moved)) print_row(t, m->body[b].name, b, -1, fixed ? "fixed to the world" : "");
   }
   char words[CAV_WORDS];
-  for (int g = 0; g < m->ngeom; g++)
+  for (int g = 0; g < m->ngeom && !t->moved; g++)
     if (m->geom[g].body == 0) print_row(t, cav_geom_words(m, g, words), 0, g, "geom of the world");
 }
 
+// the table at a posture; moved: of what has a role or is a thing alone, as the world stays
+static cav_status print_table(const cav_model *m, const cav_roles *roles, cav_state *state, const double *q,
+                              const char *when, int moved) {
+  table t = {.model = m, .state = state, .when = when, .moved = moved};
+  cav_status status = cav_position(m, state, q);
+  if (status) return status;
+  print_roles(&t, roles);
+  print_things(&t, roles);
+  if (t.rows) printf("\n");
+  return CAV_OK;
+}
+
 cav_status cav_command_print_extents(const cav_model *m, const cav_problem *p, cav_error *error) {
-  table t = {.model = m, .state = cav_state_new(m), .when = p ? "start" : "posture of the file"};
+  cav_state *state = cav_state_new(m);
   cav_roles roles;
-  cav_status status = t.state ? cav_roles_find(m, t.state, &roles) : CAV_NO_MEMORY;
-  if (!status) status = cav_position(m, t.state, p ? p->q_start : m->q0);
-  if (status) {
-    cav_file_fail(error, status, 0, "where surfaces end cannot be evaluated");
-  } else {
-    print_roles(&t, &roles);
-    print_things(&t, &roles);
-    if (t.rows) printf("\n");
-  }
-  cav_state_free(t.state);
+  cav_status status = state ? cav_roles_find(m, state, &roles) : CAV_NO_MEMORY;
+  if (!status) status = print_table(m, &roles, state, p ? p->q_start : m->q0, p ? "start" : "posture of the file", 0);
+  if (!status && p && cav_problem_has_goal(p)) status = print_table(m, &roles, state, p->q_goal, "goal", 1);
+  if (status) cav_file_fail(error, status, 0, "where surfaces end cannot be evaluated");
+  cav_state_free(state);
   return status;
 }

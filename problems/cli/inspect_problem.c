@@ -1,6 +1,7 @@
 /// What a problem asks for, in words: its horizon, start and goal, terms and schedule, for cavort inspect.
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "command.h"
@@ -300,6 +301,28 @@ static void print_start_speeds(const cav_problem *p) {
   }
 }
 
+// how a solve begins where that is not the guess above, and all that it may try; what cannot be planned has none
+static cav_status print_strategies(const cav_problem *p, int all) {
+  if (cav_command_count_planned(p->model) != p->model->nu) return CAV_OK;
+  cav_strategy *strategy = calloc(CAV_STRATEGIES, sizeof *strategy);
+  int n = 0;
+  cav_status status = strategy ? cav_strategy_list(p, strategy, &n) : CAV_NO_MEMORY;
+  if (!status && n > 0) cav_command_tell_begin(stdout, "  ", strategy);
+  int near = 0, mended = 0;
+  if (!status && all) printf("strategies in the order in which solve tries them, until one does all that is asked\n");
+  for (int i = 0; i < n && !status && all; i++) {
+    near += strategy[i].use == CAV_STRATEGY_NEAR, mended += strategy[i].use == CAV_STRATEGY_REPAIR;
+    if (strategy[i].use == CAV_STRATEGY_NEAR || strategy[i].use == CAV_STRATEGY_REPAIR) continue;
+    printf("  %-12s %s\n", strategy[i].name, strategy[i].text);
+  }
+  if (near) printf("  near-1..%d   between these, what is nearly there with the usual cure of what it misses\n", near);
+  if (mended)
+    printf("  repair-1..%d  at last, the best one so far with the usual cure of what it misses first\n", mended);
+  cav_strategies_clear(strategy, n);
+  free(strategy);
+  return status;
+}
+
 cav_status cav_command_print_problem(const cav_problem *p, int all, cav_error *error) {
   static const char *const order[] = {"euler", "midpoint", "momentum"};
   int knots = (int)lround(p->duration / p->timestep) + 1;
@@ -327,9 +350,10 @@ cav_status cav_command_print_problem(const cav_problem *p, int all, cav_error *e
            : p->cycle.mirror == CAV_MIRROR_Y ? ", mirrored along y"
                                              : "");
   cav_command_tell_asymmetry(p, stdout);
-  cav_status status = cav_command_print_stance(p, "start", p->q_start, all, error);
+  cav_status status = cav_command_print_stance(p, "start", p->q_start, 0, all, error);
   if (!status && !p->cycle.on) print_start_speeds(p);
-  if (!status && cav_problem_has_goal(p)) status = cav_command_print_stance(p, "goal", p->q_goal, all, error);
+  if (!status && cav_problem_has_goal(p))
+    status = cav_command_print_stance(p, "goal", p->q_goal, p->close_at_rest, all, error);
   if (status) return status;
   if (!cav_problem_has_goal(p)) printf("  goal   no <goal>: the goal posture is the start\n");
   if (*cav_problem_lowered(p))
@@ -349,6 +373,7 @@ cav_status cav_command_print_problem(const cav_problem *p, int all, cav_error *e
   if (p->guess_bow[0] != 0 || p->guess_bow[1] != 0)
     printf(", with a bow of %g %g m from %g to %g s", p->guess_bow[0], p->guess_bow[1], p->guess_from, p->guess_to);
   printf("\n");
+  if ((status = print_strategies(p, all))) return status;
   // of a model that solve refuses there are none
   if (all && cav_command_count_planned(p->model) == p->model->nu && (status = print_equations(p, error))) return status;
   printf("  actuators up to %g of their limits, joints and tendons %g rad or m inside theirs\n", p->effort_limit,

@@ -57,7 +57,8 @@ static void tell(const cav_model *m, const penetration *p, double timestep, int 
 }
 
 void cav_command_tell_guess(FILE *out, const cav_problem *p, int whole) {
-  static const double deep = 0.02; // m
+  // m; that of solids is where solve begins over them
+  static const double deep[KINDS] = {[PLANE] = 0.02, [SOLID] = 0.01, [TREE] = 0.02, [LINK] = 0.02};
   // and what solve does there
   static const char *const told[KINDS][2] = {
       [SOLID] = {"the guess runs into a solid",
@@ -82,8 +83,8 @@ void cav_command_tell_guess(FILE *out, const cav_problem *p, int whole) {
   for (int t = 0; !status && t < guess->nknot && whole; t++)
     status = note_depths(p->model, state, guess->q + (size_t)t * (size_t)guess->nq, t, way);
   int kind = SOLID;
-  while (kind < KINDS && !(way[kind].depth > fmax(deep, ends.depth))) kind++;
-  if (!status && waypoints.depth > fmax(deep, ends.depth)) {
+  while (kind < KINDS && !(way[kind].depth > fmax(deep[kind], ends.depth))) kind++;
+  if (!status && waypoints.depth > fmax(deep[PLANE], ends.depth)) {
     tell(p->model, &waypoints, p->timestep, 1, text, sizeof text);
     fprintf(out, "note: a waypoint of the guess is inside something, %s; cavort view PROBLEM shows it\n", text);
   } else if (!status && kind < KINDS) {
@@ -93,6 +94,18 @@ void cav_command_tell_guess(FILE *out, const cav_problem *p, int whole) {
   }
   cav_trajectory_free(guess);
   cav_state_free(state);
+}
+
+void cav_command_tell_begin(FILE *out, const char *indent, const cav_strategy *first) {
+  if (!first->hand && first->stated) return;
+  fprintf(out, "%s%s: begun %s\n", indent,
+          first->hand ? "the file has no <guess>, and no term of it brings a hand to what has to be moved"
+          : first->nreach
+              ? "the file has no <goal>, and the straight way to what is asked for at the end runs into something"
+              : "the straight way from start to goal runs into a solid or the ground, or turns feet where "
+                "they stand, and no "
+                "waypoint of a <guess> leads otherwise",
+          first->text);
 }
 
 // FILE.view.html, in the folder of the command

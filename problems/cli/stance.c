@@ -11,6 +11,8 @@
 
 // farther apart it does not touch; less deep is rounding; bodies that are named, the others are counted
 static const double touching = 0.005, deep = 5e-5; // m
+// m beside what bears it from which on a posture is told to fall: a goal is met within some centimetres
+static const double leaning = 0.05;
 enum { NAMED = 8 };
 
 int cav_command_pair(const cav_model *m, int pair, char moves[CAV_WORDS], char stands[CAV_WORDS]) {
@@ -111,7 +113,29 @@ static int find_centre(const cav_model *m, const cav_state *state, double com[3]
   return aside;
 }
 
-cav_status cav_command_print_stance(const cav_problem *p, const char *name, const double *q, int all,
+// how far the centre of mass of what actuators move, which is free, lies beside all that bears it, m, where only level surfaces
+// do; 0: over it, or not known
+static double beside(const cav_model *m, const cav_state *state, const double com[3]) {
+  double low[2] = {INFINITY, INFINITY}, high[2] = {-INFINITY, -INFINITY}, off = 0;
+  if (m->gravity[0] != 0 || m->gravity[1] != 0 || !(m->gravity[2] < 0)) return 0;
+  // what hangs on the world by a joint, or on another body by a constraint, may lean on that
+  for (int j = 0; j < m->njoint; j++)
+    if (m->link[m->joint[j].link].driven && m->link[m->joint[j].link].parent == 0 && m->joint[j].type != CAV_JOINT_FREE)
+      return 0;
+  if (m->nequality) return 0;
+  for (int i = 0; i < state->ncontact; i++) {
+    const cav_contact *c = &state->contact[i];
+    const int body = body_of(m, c);
+    if (c->dist <= touching && c->link1 > 0 && c->link2 > 0 && m->pair[c->pair].external) return 0;
+    if (!body || !m->link[m->body[body].link].driven) continue;
+    if (fabs(c->frame[2]) < 0.99) return 0;
+    for (int k = 0; k < 2; k++) low[k] = fmin(low[k], c->pos[k]), high[k] = fmax(high[k], c->pos[k]);
+  }
+  for (int k = 0; k < 2 && low[0] <= high[0]; k++) off = fmax(off, fmax(low[k] - com[k], com[k] - high[k]));
+  return fmax(off, 0);
+}
+
+cav_status cav_command_print_stance(const cav_problem *p, const char *name, const double *q, int rests, int all,
                                     cav_error *error) {
   cav_state *state = cav_state_new(p->model);
   double com[3];
@@ -137,6 +161,12 @@ cav_status cav_command_print_stance(const cav_problem *p, const char *name, cons
     printf(", deepest penetration %.1f mm: '%.100s' in '%.100s'", -1e3 * deepest->dist, moves, stands);
   }
   printf("\n");
+  const double off = rests ? beside(p->model, state, com) : 0;
+  if (off > leaning)
+    printf(
+        "  note: the centre of mass of the %s is %.2g m beside all that bears it: so it cannot be at rest; what is to "
+        "bear it there, a seat or a box, has to touch it\n",
+        name, off);
   cav_state_free(state);
   return CAV_OK;
 }

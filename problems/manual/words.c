@@ -87,7 +87,8 @@ static const struct {
     {"axis|axes|direction|upright|vertical|orientation|tilt|facing|heading",
      "sensors framexaxis, frameyaxis and framezaxis read where an axis of a body points, framequat a whole "
      "orientation:\n"
-     "  <sensor type=\"framezaxis\" xbody=\"torso\" target=\"0 0 1\" at=\"end\" weight=\"900\"/> is upright",
+     "  <sensor type=\"framezaxis\" xbody=\"torso\" target=\"0 0 1\" at=\"end\" weight=\"900\"/> is upright.\n"
+     "  <root turn=\"90\"/> of <start> and <goal> turns a posture to the left as it is",
      "sensors"},
     {"x|y|z|world|coordinates|left|right|forwards|forward|up|down",
      "z is up; x and y are those of the model's file, of most robots x forwards and y left. One of them counts by\n"
@@ -246,11 +247,11 @@ static const struct {
      "  a walk from start to goal needs neither, its gait is found",
      "cycle"},
     {"turn|yaw|pirouette",
-     "how a body is turned at the end: <root pos=\"X Y Z\" euler=\"0 0 90\"/> of <goal>, degrees to the left, and a "
+     "how a body is turned at the end: <root turn=\"90\"/> of <goal>, degrees to the left, whatever its posture, and a "
      "posture that\n"
-     "  asks for it (dofs=\"all\"); of a cycle rotation=. Which way a turn by more than 180 degrees goes is said by "
+     "  asks for it (dofs=\"all\"); of a cycle rotation=. Which way a turn by 180 degrees and more goes is said by "
      "rotation=\n  of <guess>",
-     "euler"},
+     "rotation"},
     {"wheel|wheels|flywheel|reaction|pendulum|balance|balancing|unstable|swingup",
      "what turns without end is no posture: <posture joint=\"wheel\" weight=\"0\"/>, and <velocity joint=\"wheel\" "
      "weight=\"0\"/>\n"
