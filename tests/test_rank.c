@@ -82,6 +82,24 @@ static void test_undone(void) {
   CHECK(cav_rank_better(&still, &swings, 0) && !cav_rank_better(&swings, &still, 0));
 }
 
+// one that leaves a ball where it is, far from where it was to go, has one of three targets alone missed: it is kept before one
+// that sends it there and slips, unless that costs a hundredth; and a forward step that has another solution is nearer to a
+// certificate than slip of a fifth beyond its tolerance, since it has a cure
+static void test_far(void) {
+  cav_race_report alone = whole(), sends = whole(), slides = whole();
+  alone.verdict.certified = 1, alone.verdict.ntarget = 3, alone.verdict.nmissed = 1, alone.verdict.missed_most = 10;
+  sends.verdict.ntarget = slides.verdict.ntarget = 3, sends.verdict.achieved = slides.verdict.achieved = 1;
+  sends.verdict.slip_mean_m_s = 1.3 * CAV_TOLERANCE_SLIP, slides.verdict.slip_mean_m_s = 1.2 * CAV_TOLERANCE_SLIP;
+  alone.cost = 450, sends.cost = 4.2;
+  CHECK(cav_rank_far(&alone) && !cav_rank_far(&sends));
+  CHECK(cav_rank_better(&sends, &alone, 0) && !cav_rank_better(&alone, &sends, 0));
+  alone.verdict.missed_most = 3;
+  CHECK(!cav_rank_far(&alone) && cav_rank_better(&alone, &sends, 0));
+  cav_race_report folds = whole();
+  folds.verdict.ntarget = 3, folds.verdict.achieved = 1, folds.verdict.replay_step_max_error = 4e-4;
+  CHECK(cav_rank_nearer(&folds, &slides) && !cav_rank_nearer(&slides, &folds));
+}
+
 // what is changed of a problem has to be worth it: another class, or a hundredth of the cost; what achieves what was asked is
 static void test_worth(void) {
   cav_race_report stated = whole(), changed = whole();
@@ -237,6 +255,7 @@ int main(void) {
   test_better();
   test_asked();
   test_undone();
+  test_far();
   test_worth();
   test_near();
   test_off();

@@ -507,6 +507,13 @@ static int repairs_of(const cav_race *race, int i, int of) {
   return n;
 }
 
+// whether a motion leaves where it was what a hand has to be brought to: that is moved by no weights
+static int left_alone(const cav_race *race, const cav_race_report *report) {
+  int hand = 0;
+  for (int k = 1; k < race->n; k++) hand |= race->entry[k].strategy.hand;
+  return hand && cav_rank_far(report);
+}
+
 // the nearest of those before entry i that are near, and were not mended as often as may be. -1: none
 static int find_near(const cav_race *race, int i, const char *passed) {
   int best = -1;
@@ -514,6 +521,7 @@ static int find_near(const cav_race *race, int i, const char *passed) {
     const cav_race_entry *e = &race->entry[k];
     if (e->state != CAV_RACE_DONE || !cav_rank_near(&e->report, race->problem->effort_limit) || passed[k]) continue;
     if (e->strategy.use == CAV_STRATEGY_DIAGNOSIS || repairs_of(race, i, k) >= REPAIRS_OF_ONE) continue;
+    if (left_alone(race, &e->report)) continue;
     if (best < 0 || cav_rank_nearer(&e->report, &race->entry[best].report)) best = k;
   }
   return best;
@@ -569,8 +577,11 @@ static int misses_rest(const cav_race *race) {
 // whether a strategy is of no use: costs that are light at first serve where forces or limits do not come in
 static int is_idle(const cav_race *race, int i) {
   const cav_race_report *first = &race->entry[0].report;
-  const int eased = race->entry[i].strategy.schedule.light_avoided && !race->problem->schedule.light_avoided;
-  return eased && first->solution && cav_verdict_feasible(&first->verdict);
+  const cav_strategy *s = &race->entry[i].strategy;
+  const int eased = s->schedule.light_avoided && !race->problem->schedule.light_avoided;
+  if (eased && first->solution && cav_verdict_feasible(&first->verdict)) return 1;
+  // from where a hand has to be brought the same guess by another schedule leads nowhere else
+  return i > 0 && s->stated && !s->hand && !s->samples && left_alone(race, first);
 }
 
 // whether a strategy that waits may start: those for a case only after all before them

@@ -23,6 +23,9 @@ static const double nearly = 5e-3;
 // something else: what is missed is in the cost
 static const double undone = 0.1;
 
+// times its tolerance from which on what a certified motion misses is not a matter of weights
+static const double far = 5;
+
 static int misses_little(const cav_verdict *v) { return v->missed_most > 0 && v->missed_most < CAV_MISSED_LITTLE; }
 
 int cav_rank_keeps(const cav_verdict *v) {
@@ -34,7 +37,7 @@ int cav_rank_keeps(const cav_verdict *v) {
 static int class_of(const cav_race_report *report) {
   const cav_verdict *v = &report->verdict;
   if (cav_race_success(report)) return 4;
-  if (v->certified) return 2 * v->nmissed < v->ntarget || misses_little(v) ? 3 : 1;
+  if (v->certified) return misses_little(v) || (2 * v->nmissed < v->ntarget && !cav_rank_far(report)) ? 3 : 1;
   return v->achieved && cav_verdict_feasible(v) ? 2 : 0;
 }
 
@@ -90,6 +93,10 @@ int cav_rank_close(const cav_race_report *report) {
   return report->verdict.certified && misses_little(&report->verdict);
 }
 
+int cav_rank_far(const cav_race_report *report) {
+  return report->verdict.certified && report->verdict.missed_most > far;
+}
+
 int cav_rank_near(const cav_race_report *report, double effort) {
   const cav_verdict *v = &report->verdict;
   if (!report->solution || report->status == CAV_INTERRUPTED) return 0;
@@ -102,8 +109,9 @@ int cav_rank_near(const cav_race_report *report, double effort) {
          v->limit_violation_max < (1 - effort) / 2;
 }
 
-// what a forward step that has another solution than the planned one counts, however far that is
-static const double folded = 2;
+// what a forward step that has another solution than the planned one counts, however far that is: less than slip of a fifth
+// beyond its tolerance, since another law of contacts mends it
+static const double folded = 1.1;
 
 // the largest ratio of a figure to its tolerance; *which: 0 of the balance of momentum, 1 slip, 2 hover
 static double over_tolerance(const cav_verdict *v, int *which) {

@@ -27,6 +27,9 @@ int cav_rank_near(const cav_race_report *report, double effort);
 /// Whether a motion is certified and misses little of what was asked: a heavier weight of that is a matter of some iterations.
 int cav_rank_close(const cav_race_report *report);
 
+/// Whether a motion is certified and far from something that was asked: as a rule what was to move has stayed where it was.
+int cav_rank_far(const cav_race_report *report);
+
 /// Whether a is the better motion to mend: of two that are certified and miss targets the one that misses fewer, or the same
 /// number by less; of two that are rough the one that misses no target, else the one whose largest
 /// ratio of a figure to its tolerance is smaller; of others the better one to keep.
