@@ -454,6 +454,30 @@ inspected 0 block.xml
 check "the guess runs into the block" grep -qE "^note: the guess runs into a solid, deepest [0-9.]+ mm at [0-9.]+ s: '.*' in 'block'" out
 inspected 0 "$root/problems/motions/turn-over/problem.xml"
 not_said "note: the guess runs"
+# how solve begins there, and what it may try
+inspected 0 block.xml
+check "how it begins" grep -qE "^  the straight way from start to goal runs into a solid .*: begun over solids" out
+check "strategies" grep -qE "^  stated +" out
+check "repairs are counted, not listed" grep -qE "^  near-1\.\.[0-9]+ " out
+check "surfaces at the goal" grep -q "^surfaces, m .* at the goal" out
+# thinner than a centimetre in all directions
+sed 's/type="box" pos="0.5 0 0.1" size="0.1 0.5 0.1"/type="capsule" fromto="0.5 -0.5 0.3 0.5 0.5 0.3" size="0.006"/' block.xml >bar.xml
+inspected 0 bar.xml
+check "the guess runs through a bar" grep -qE "^note: the guess runs into a solid, deepest [0-9.]+ mm .* in 'block'" out
+
+# --- a goal at rest that nothing bears: sitting on nothing; on a seat it is borne ---
+posture <<'TEXT'
+<start key="stand" height="floor"/><goal key="sit" height="floor"/>
+TEXT
+inspected 0 p.xml
+check "sitting on nothing" grep -qE "^  note: the goal as it stands would fall: its centre of mass is 0\.[0-9]+ m beside" out
+posture <<'TEXT'
+<scene><geom name="seat" type="box" pos="-0.15 0 0.215" size="0.2 0.2 0.215"/></scene>
+<start key="stand" height="floor"><root pos="0.3 0"/></start><goal key="sit" height="floor"/>
+TEXT
+inspected 0 p.xml
+not_said "would fall"
+
 # links of one body, and a body in a thing, are no solids
 posture <<'TEXT'
 <start key="stand"><joint name="hip_x_right" degrees="15"/><joint name="hip_x_left" degrees="15"/><joint name="hip_y_right" degrees="-20"/>

@@ -128,7 +128,7 @@ static double beside(const cav_model *m, const cav_state *state, const double co
     const int body = body_of(m, c);
     if (c->dist <= touching && c->link1 > 0 && c->link2 > 0 && m->pair[c->pair].external) return 0;
     if (!body || !m->link[m->body[body].link].driven) continue;
-    if (fabs(c->frame[2]) < 0.99) return 0;
+    if (fabs(c->frame[2]) < 0.999) return 0;
     for (int k = 0; k < 2; k++) low[k] = fmin(low[k], c->pos[k]), high[k] = fmax(high[k], c->pos[k]);
   }
   for (int k = 0; k < 2 && low[0] <= high[0]; k++) off = fmax(off, fmax(low[k] - com[k], com[k] - high[k]));
@@ -164,8 +164,9 @@ cav_status cav_command_print_stance(const cav_problem *p, const char *name, cons
   const double off = rests ? beside(p->model, state, com) : 0;
   if (off > leaning)
     printf(
-        "  note: the centre of mass of the %s is %.2g m beside all that bears it: so it cannot be at rest; what is to "
-        "bear it there, a seat or a box, has to touch it\n",
+        "  note: the %s as it stands would fall: its centre of mass is %.2g m beside all that bears it; a seat, a box "
+        "or a "
+        "hand has to touch there\n",
         name, off);
   cav_state_free(state);
   return CAV_OK;

@@ -137,8 +137,12 @@ static const struct {
      "forces of actuators are planned within their limits: <effort> is their cost, <limits effort> how much of them is "
      "used",
      "effort"},
-    {"friction|footstep|footsteps|contacts",
-     "contacts are found, no file says when; friction is that of geoms, in the model's file or the <scene>", "contact"},
+    {"friction|priority|slippery|footstep|footsteps|contacts",
+     "contacts are found, no file says when; friction is that of geoms, in the model's file or the <scene>: of two "
+     "that "
+     "touch the\n"
+     "  larger counts, or that of the one with the higher priority= (MJCF)",
+     "contact"},
     {"dt|knot|step|steps|fps|length", "knots are timestep apart, duration is a whole number of steps", "horizon"},
     {"touching|press|pressure|lean|support|bear",
      "a force on a body: <sensor type=\"touch\" body=\"right hand\" target=\"20\" scale=\"20\" within=\"5\" "
