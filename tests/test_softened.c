@@ -149,8 +149,8 @@ static void test_left(int leaves, int follows) {
   cav_problem_free(problem);
 }
 
-// where weights of rows drown the costs' Hessian a look finds a part of what may be saved; a run that is stuck may leave a quarter
-// more than is asked for
+// where weights of rows drown the costs' Hessian a look finds a part of what may be saved; a run that is stuck may leave a
+// quarter more than is asked for
 static void test_end(void) {
 #ifndef SANITIZED
   cav_problem *problem = motion_load(&(motion_case){"walk-cycle", "mujoco/humanoid.xml"});
