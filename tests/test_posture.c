@@ -246,7 +246,8 @@ static void check_files(const char *folder) {
 static void check_turn(const char *folder) {
   cav_error error = {0};
   cav_problem *as_it_is = load(folder, "<start key='all-fours' height='floor'/>", &error),
-              *turned = load(folder, "<start key='all-fours' height='floor'><root pos='.5 .2' turn='90'/></start>", &error);
+              *turned =
+                  load(folder, "<start key='all-fours' height='floor'><root pos='.5 .2' turn='90'/></start>", &error);
   if (CHECK(as_it_is && turned)) {
     const double *p = as_it_is->q_start, *q = turned->q_start;
     double there[9], here[9];

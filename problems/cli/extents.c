@@ -7,6 +7,7 @@
 
 #include "command.h"
 #include "file.h"
+#include "problem_file.h"
 #include "role.h"
 
 /// A box along the axes of the world around some geoms, m.
