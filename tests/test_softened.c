@@ -149,9 +149,9 @@ static void test_left(int leaves, int follows) {
   cav_problem_free(problem);
 }
 
-// where weights of rows drown the costs' Hessian a look finds a part of what may be saved; a run that is stuck may leave a
-// quarter more than is asked for
-static void test_end(void) {
+// where weights of rows drown the costs' Hessian a look finds a part of what may be saved: it said that this was the end 1.05e-3
+// from the optimum
+static void test_end_confirmed(void) {
 #ifndef SANITIZED
   cav_problem *problem = motion_load(&(motion_case){"walk-cycle", "mujoco/humanoid.xml"});
   if (!problem) return;
@@ -166,7 +166,7 @@ static void test_end(void) {
     CHECK(cav_verify_optimality(problem, s->trajectory, &s->contact, s->nrow, s->row, &v, &error) == CAV_OK);
     printf("walk-cycle of MuJoCo's humanoid: %.2g of its cost left, %.2g asked for\n", v.optimality,
            options.optimality);
-    CHECK(v.optimality <= 1.25 * options.optimality);
+    CHECK(v.optimality <= options.optimality);
   }
   cav_solution_free(s);
   cav_problem_free(problem);
@@ -174,7 +174,7 @@ static void test_end(void) {
 }
 
 int main(void) {
-  test_end();
+  test_end_confirmed();
   test_left(0, 0), test_left(1, 0), test_left(1, 1);
   test_stopped(shove(), (patience){"softened", 40, 5e-4}, 0.043);
   test_stopped(shove(), (patience){"sqp", 150, 1e-4}, 0.043);

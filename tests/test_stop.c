@@ -73,7 +73,7 @@ int main(void) {
   printf("pushed and stopped: cost %.5f, %.1e of it left, %s%s\n", v.cost, v.optimality,
          v.certified ? "certified" : "not certified: ", v.reason);
   CHECK(v.certified && v.achieved);
-  CHECK(v.cost < 0.0378 && v.optimality < 1e-3);
+  CHECK(v.cost < 0.0397 && v.optimality < 1e-6);
   cav_solution_free(s);
   cav_problem_free(problem);
   return check_result();

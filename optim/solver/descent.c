@@ -424,10 +424,6 @@ static cav_status iterate(cav_solve_run *run, cav_descent *d, int *taken) {
   return d->age < 0 && !is_lost(run, d) ? renew(run, d, 1, taken) : CAV_OK;
 }
 
-void cav_descent_open(const cav_solve_run *run, cav_descent *d) {
-  for (int b = 0; b <= cav_transcription_blocks(run->tr); b++) d->radius[b] = fmax(d->radius[b], first_radius);
-}
-
 cav_status cav_descent_step(cav_solve_run *run, cav_descent *d, int *taken) {
   cav_status status = model(run, d, 0);
   return status == CAV_OK ? iterate(run, d, taken) : status;

@@ -55,10 +55,6 @@ void cav_descent_begin(cav_solve_run *run, cav_descent *descent);
 /// CAV_INTERRUPTED, or what the evaluation says.
 cav_status cav_descent_step(cav_solve_run *run, cav_descent *descent, int *taken);
 
-/// Boxes no smaller than at the start: one grows only where it holds a step that does as forecast, and what rows bend by
-/// counts as missed, so that boxes which have shrunk once can keep all steps short.
-void cav_descent_open(const cav_solve_run *run, cav_descent *descent);
-
 /// A step across a jump of the merit, in the largest box in which it loses little. *taken: whether there is one.
 cav_status cav_descent_leap(cav_solve_run *run, cav_descent *descent, int *taken);
 

@@ -23,7 +23,6 @@ enum { PATIENCE = 8 };
 /// gains where progress is not slow, and where it is so slow that a run is stuck: that is its end too, where what is left
 /// is no more than so many times what is asked for.
 enum { LOOK = 5, LOOKS = 2 };
-enum { OPENINGS = 12 };
 static const double brisk = 0.5, sluggish = 0.03, doubtful = 0.01, left_alone = 1.25;
 
 /// Part of what may be left to be saved: one look that finds no more ends a run whose iterations gain less than that each,
@@ -161,7 +160,7 @@ static cav_status screen(cav_solve_run *run, cav_descent *d) {
 /// Iterations to where no step gains, 1, what one may gain is little and is slow to come, 2, or is more and hardly
 /// comes, 3; or 0.
 static cav_status settle(cav_solve_run *run, cav_descent *d, int *left, int *settled) {
-  int calm = 0, taken = 1, opened = 0;
+  int calm = 0, taken = 1;
   tail end = {0};
   double off = cav_run_rows_off(run);
   // iterations left to bring rows in by half; 0: they came, or were in
@@ -175,12 +174,6 @@ static cav_status settle(cav_solve_run *run, cav_descent *d, int *left, int *set
     if (status == CAV_OK) status = hold(run, d);
     if (status == CAV_OK) status = screen(run, d);
     if (status == CAV_OK) status = look(run, d, &end);
-    // a run is stuck once it is so in open boxes, too
-    if (end.stuck > 0 && opened < OPENINGS && !d->patient) {
-      cav_descent_open(run, d);
-      end.stuck = 0;
-      opened++;
-    }
     const int nearer = away && cav_run_rows_off(run) < 0.5 * off;
     if (nearer) off = cav_run_rows_off(run), away = off > astray ? ASTRAY : 0;
     if (away && !nearer && !--away) break;

@@ -139,8 +139,7 @@ static const struct {
      "effort"},
     {"friction|priority|slippery|footstep|footsteps|contacts",
      "contacts are found, no file says when; friction is that of geoms, in the model's file or the <scene>: of two "
-     "that "
-     "touch the\n"
+     "that touch the\n"
      "  larger counts, or that of the one with the higher priority= (MJCF)",
      "contact"},
     {"dt|knot|step|steps|fps|length", "knots are timestep apart, duration is a whole number of steps", "horizon"},
