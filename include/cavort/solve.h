@@ -153,8 +153,9 @@ typedef struct cav_solve_options {
                   ///< fraction of the cost, by the model of cav_verify_optimality; 0: where none gains
   int diagnose; ///< 1: where constraints cannot all hold, end at their least violation, which cav_explain needs
   /// 1: with gains, a motion whose constraints hold, but that no gains would certify, for its slip, hover, depth or
-  /// momentum, is made no cheaper and has none; nor is one that is stuck and that no set of a few gains follows, which
-  /// has the best of them: who goes on to another one loses nothing by it. Of the own solver.
+  /// momentum, is made no cheaper and has none; nor is one that is stuck and that no set of a few gains follows, or that
+  /// misses what it is asked to reach, which has the best of them: who goes on to another one loses nothing by it. Of the own
+  /// solver.
   int leave_refused;
   /// Of the dynamics: analytic, and what has none (cav_derivatives_missing, sensors) by one-sided differences, or all
   /// by differences. Ipopt always takes centred ones.

@@ -198,6 +198,10 @@ cav_status cav_choose_gains(const cav_problem *problem, const cav_transcription 
   if (status == CAV_OK && !(s.before.x = malloc(cav_before_numbers(&s.verification) * sizeof *s.before.x)))
     status = CAV_NO_MEMORY;
   int trials = sets > 0 && sets < TRIALS ? sets : TRIALS;
+  // a motion that does not go on from a knot as planned is refused whatever follows it; one that is not at its end yet may still
+  cav_replay steps = {0};
+  if (status == CAV_OK && !follows) status = cav_replay_steps(&s.verification, &steps);
+  if (steps.step_error > CAV_TOLERANCE_STEP) trials = 1;
   for (int i = 0; i < trials && status == CAV_OK; i++) {
     const set one = sample(&s, i);
     status = report(context, i + 1, trials) ? CAV_INTERRUPTED : try(&s, &one);

@@ -21,6 +21,10 @@ enum { ATTEMPTS = 20, CORRECTIONS = 16, SETTLING = 20 };
 /// Boxes at the start and at most (rad, m, log of the step), and where they are too small to go on.
 static const double first_radius = 0.1, most_radius = 0.7, least_radius = 1e-7;
 
+/// Parts of a look's step that are tried, largest first.
+static const double ahead[] = {1, 0.5, 0.25, 0.1, 0.03};
+enum { PARTS = sizeof ahead / sizeof *ahead };
+
 /// Fractions of the cost: predicted decrease that ends a run; one that ends it if it does not come true.
 static const double stationary = 1e-9, predicted_enough = 1e-6;
 
@@ -532,6 +536,47 @@ cav_status cav_descent_foresee(cav_solve_run *run, cav_descent *d, double *savin
   status = look_ahead(run, d, 0, saving);
   d->doubted = !isfinite(*saving);
   return status == CAV_OK && d->doubted ? look_ahead(run, d, 1, saving) : status;
+}
+
+/// Tries parts of the last look's step, smaller and smaller ones while they gain more, with the penalties of its programme; the
+/// best one to d->best. *gain: what it gains, 0 where none does; *part: which it is.
+static cav_status try_ahead(cav_solve_run *run, cav_descent *d, double *gain, double *part) {
+  *gain = *part = 0;
+  cav_course_begin(&d->course, run->tr);
+  d->merit = cav_programme_merit(run->tr, cav_quadratic_penalty(d->qp), d->before);
+  d->predicted = cav_quadratic_decrease(d->qp);
+  for (int i = 0; i < PARTS; i++) {
+    const double p = ahead[i];
+    double trial;
+    const cav_status status = try_step(run, d, p, 0.9 * p * (2 - p) * d->predicted, &trial);
+    if (status != CAV_OK) return status;
+    if (d->merit - trial > *gain) {
+      *gain = d->merit - trial, *part = p;
+      cav_run_exchange(&run->spare, &d->best);
+    } else if (*gain > 0)
+      break;
+  }
+  return CAV_OK;
+}
+
+cav_status cav_descent_go_ahead(cav_solve_run *run, cav_descent *d, double least, int *taken) {
+  const size_t bytes = (size_t)cav_quadratic_rows(d->qp) * sizeof(double);
+  double gain, part;
+  memcpy(d->offset, cav_quadratic_penalty(d->qp), bytes);
+  memcpy(cav_quadratic_penalty(d->qp), d->kept, bytes);
+  const cav_status status = try_ahead(run, d, &gain, &part);
+  *taken = status == CAV_OK && gain > least;
+  if (!*taken) memcpy(cav_quadratic_penalty(d->qp), d->offset, bytes);
+  if (status != CAV_OK) return status;
+  d->last = NULL;
+  if (*taken) {
+    cav_run_exchange(&run->at, &d->best);
+    d->gain = gain;
+    d->ratio = gain / (part * (2 - part) * d->predicted);
+    for (int b = 0; b <= cav_transcription_blocks(run->tr); b++)
+      d->radius[b] = fmax(d->radius[b], part * block_length(run->tr, cav_quadratic_step(d->qp), b));
+  }
+  return cav_transcription_values(run->tr, run->at);
 }
 
 cav_status cav_descent_confirm(cav_solve_run *run, cav_descent *d, double *saving) {

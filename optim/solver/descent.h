@@ -73,6 +73,11 @@ cav_status cav_descent_measure(cav_solve_run *run, cav_descent *descent, int cur
 /// penalties stay as they are.
 cav_status cav_descent_foresee(cav_solve_run *run, cav_descent *descent, double *saving);
 
+/// Takes the part of the last look's step that gains most, where that is more than least: it is in the full box, so all of it
+/// gets shorter together, where boxes that have shrunk keep each knot's short by itself. Boxes become no smaller than it. *taken:
+/// whether run->at has moved.
+cav_status cav_descent_go_ahead(cav_solve_run *run, cav_descent *descent, double least, int *taken);
+
 /// The same once more at the same place, of rows that give, where these were not asked for it. *saving stays where they were.
 cav_status cav_descent_confirm(cav_solve_run *run, cav_descent *descent, double *saving);
 

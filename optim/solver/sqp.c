@@ -25,6 +25,12 @@ enum { PATIENCE = 8 };
 enum { LOOK = 5, LOOKS = 2 };
 static const double brisk = 0.5, sluggish = 0.03, doubtful = 0.01, left_alone = 1.25;
 
+/// Gain of the cost, each, below which iterations are looked at whatever is asked for.
+static const double looked_at = 8e-4;
+
+/// Part of what a look finds that iterations gain, below which its own step is tried.
+static const double slower = 0.1;
+
 /// Part of what may be left to be saved: one look that finds no more ends a run whose iterations gain less than that each,
 /// however fast it converges.
 static const double near_end = 0.1;
@@ -44,6 +50,10 @@ static const double held_loss = 1e-2, nearly = 1e-4, brought_in = 0.1;
 /// those that are astray, at first or after they came nearer by half.
 static const double astray = 1e-2;
 enum { HOPELESS = 60, ASTRAY = 40 };
+
+/// Times what the rows of such a run were off by at first, and how far at least, where it ends at once: penalties of single rows
+/// have outgrown all others.
+static const double lost = 100, lost_at_least = 1;
 
 /// Slow progress where there is little to be saved: how often in a row that was so.
 typedef struct tail {
@@ -74,6 +84,25 @@ static cav_status confirm(cav_solve_run *run, cav_descent *d, tail *end) {
   return status;
 }
 
+/// Tries the step of a look that finds much more than iterations gain, gain of the cost each; a run that takes it is not stuck.
+static cav_status go_ahead(cav_solve_run *run, cav_descent *d, double gain, tail *end) {
+  if (end->near || !(end->saving > d->asked) || !(gain < slower * d->at_least)) return CAV_OK;
+  const double scale = cav_programme_scale(run->tr);
+  int taken;
+  const cav_status status = cav_descent_go_ahead(run, d, gain * scale, &taken);
+  if (taken) end->stuck = 0, end->gain = d->gain / scale;
+  return status;
+}
+
+/// Where no step gains in its boxes, that of a look, if there is something to be saved by it.
+static cav_status go_on(cav_solve_run *run, cav_descent *d, int *taken) {
+  if (!cav_run_met(run)) return CAV_OK;
+  double saving;
+  const cav_status status = cav_descent_foresee(run, d, &saving);
+  if (status != CAV_OK || d->at_least <= fmax(d->asked, optimal)) return status;
+  return cav_descent_go_ahead(run, d, slow * cav_programme_scale(run->tr), taken);
+}
+
 /// Looks, every few iterations that gain little; between two such looks once where an iteration hints at an end.
 static cav_status look(cav_solve_run *run, cav_descent *d, tail *end) {
   end->saving = INFINITY;
@@ -81,7 +110,8 @@ static cav_status look(cav_solve_run *run, cav_descent *d, tail *end) {
   int due = ++end->iterations >= LOOK, early = end->iterations > 1 && !end->hinted && hints(run, d);
   if (!due && !early) return CAV_OK;
   double gain = end->gain / end->iterations;
-  cav_status status = gain < d->asked ? cav_descent_foresee(run, d, &end->saving) : CAV_OK;
+  const int slowly = gain < fmax(d->asked, looked_at);
+  cav_status status = slowly ? cav_descent_foresee(run, d, &end->saving) : CAV_OK;
   end->near = end->saving <= d->near && gain < d->near;
   end->hinted = !due;
   if (!due) return status == CAV_OK ? confirm(run, d, end) : status;
@@ -90,6 +120,7 @@ static cav_status look(cav_solve_run *run, cav_descent *d, tail *end) {
   // what is not finished tells less
   const double little = d->doubted ? doubtful : sluggish;
   end->stuck = gain < d->asked && gain < little * d->at_least ? end->stuck + 1 : 0;
+  if (status == CAV_OK && slowly) status = go_ahead(run, d, gain, end);
   return status == CAV_OK ? confirm(run, d, end) : status;
 }
 
@@ -163,11 +194,13 @@ static cav_status settle(cav_solve_run *run, cav_descent *d, int *left, int *set
   int calm = 0, taken = 1;
   tail end = {0};
   double off = cav_run_rows_off(run);
+  const double most = off > astray ? fmax(lost * off, lost_at_least) : INFINITY;
   // iterations left to bring rows in by half; 0: they came, or were in
   int away = off > astray ? ASTRAY : off > nearly ? HOPELESS : 0;
   cav_status status = CAV_OK;
   for (; status == CAV_OK && *left > 0 && calm < PATIENCE && !is_end(d, &end) && !run->refused; --*left) {
     status = cav_descent_step(run, d, &taken);
+    if (status == CAV_OK && !taken) status = go_on(run, d, &taken);
     if (status != CAV_OK || !taken) break;
     calm = d->gain < slow * cav_programme_scale(run->tr) ? calm + 1 : 0;
     if (cav_run_report(run, cav_quadratic_length(d->qp), cav_descent_radius(run->tr, d))) status = CAV_INTERRUPTED;
@@ -176,7 +209,7 @@ static cav_status settle(cav_solve_run *run, cav_descent *d, int *left, int *set
     if (status == CAV_OK) status = look(run, d, &end);
     const int nearer = away && cav_run_rows_off(run) < 0.5 * off;
     if (nearer) off = cav_run_rows_off(run), away = off > astray ? ASTRAY : 0;
-    if (away && !nearer && !--away) break;
+    if ((away && !nearer && !--away) || cav_run_rows_off(run) > most) break;
   }
   int ended = is_end(d, &end);
   *settled = ended ? ended : !taken || calm >= PATIENCE;
