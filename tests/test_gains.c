@@ -1,10 +1,11 @@
 /// The choice of gains against its rule, on closed loops whose outcomes are drawn: what is kept is what a look at every loop
 /// of every trial would keep, the search ends where the rule says, and few loops are run for it.
 #include "lqr.h"
+#include "rollout.h"
 #include "scene.h"
 #include "verification.h"
 
-enum { TRIALS = 120, UNHELD = 64, PLAIN = 40, FEW = 3 };
+enum { TRIALS = 120, UNHELD = 64, PLAIN = 40, ROLLED = 12, FEW = 3 };
 /// s: of the motion.
 static const double duration = 0.2;
 
@@ -14,7 +15,7 @@ static const char cart[] =
     "<actuator><motor joint='x' gear='5' ctrllimited='true' ctrlrange='-1 1'/></actuator></mujoco>";
 
 /// What each loop of each trial does, of which trial it is the turn, and loops run.
-static struct cav_follow drawn[TRIALS][CAV_LOOPS];
+static struct cav_follow drawn[TRIALS + 1][CAV_LOOPS];
 static int trial, run;
 
 cav_status __wrap_cav_closed_loop(const cav_verification *verification, int loop, const double *gain_q,
@@ -39,6 +40,24 @@ cav_status __wrap_cav_replay_steps(const cav_verification *verification, cav_rep
   return CAV_OK;
 }
 
+/// Gains put together, which are told by this number, and of how many sets; what their loops do is drawn.
+enum { TOGETHER = TRIALS };
+static int together;
+
+cav_status __real_cav_rollout(const cav_transcription *tr, const cav_verification *verification, int sets,
+                              const double *const *set, double *gain);
+cav_status __wrap_cav_rollout(const cav_transcription *tr, const cav_verification *verification, int sets,
+                              const double *const *set, double *gain);
+cav_status __wrap_cav_rollout(const cav_transcription *tr, const cav_verification *verification, int sets,
+                              const double *const *set, double *gain) {
+  (void)tr, (void)verification;
+  // the gains of each set are its own
+  for (int k = 0; k < sets; k++) CHECK((int)*set[k] == k);
+  (void)gain;
+  together = sets, trial = TOGETHER;
+  return CAV_OK;
+}
+
 /// Sets that are told to be tried at most.
 static int all_sets = TRIALS;
 
@@ -49,10 +68,55 @@ static int next(void *context, int set, int most) {
   return 0;
 }
 
+/// A pole that stands on a motor, held by one regulator in the first half and by another in the second; in the other half each
+/// throws it over.
+static void test_pole(void) {
+  static const char pole[] =
+      "<mujoco><worldbody><body><joint type='hinge' axis='0 1 0'/><geom type='capsule' fromto='0 0 0 0 0 1' size='.05' "
+      "mass='1' contype='0' conaffinity='0'/></body></worldbody><actuator><motor joint='x'/></actuator></mujoco>";
+  char text[sizeof pole + 16];
+  const char *hinge = strstr(pole, "type='hinge'");
+  snprintf(text, sizeof text, "%.*sname='x' %s", (int)(hinge - pole), pole, hinge);
+  cav_model *model = scene_load(text);
+  cav_problem problem = cav_problem_default(model);
+  double still = 0;
+  problem.timestep = 0.02, problem.duration = 2;
+  problem.q_start = problem.q_goal = (double *)model->q0;
+  problem.v_start = &still;
+  cav_transcription *tr = cav_transcription_new(&problem, 1, NULL);
+  cav_trajectory *motion = cav_trajectory_new(model, tr->nknot, problem.timestep);
+  cav_verification v;
+  CHECK(cav_closed_loops_begin(&v, &problem, motion, &tr->options, NULL) == CAV_OK);
+  const int last = v.last;
+  double *gain = calloc(3 * 2 * (size_t)last, sizeof *gain);
+  const double *set[] = {gain, gain + 2 * last};
+  double *rolled = gain + 4 * last;
+  for (int t = 0; t < last; t++)
+    for (int k = 0; k < 2; k++) {
+      const double way = (2 * t < last) == (k == 0) ? -1 : 1;
+      gain[2 * last * k + t] = 60 * way, gain[2 * last * k + last + t] = 15 * way;
+    }
+  CHECK(__real_cav_rollout(tr, &v, 2, set, rolled) == CAV_OK);
+  for (int k = 0; k < 3; k++) {
+    double strayed;
+    const double *one = k < 2 ? set[k] : rolled;
+    cav_lane *lane = cav_lane_own(&v, 0, 1);
+    CHECK(lane && cav_lane_run(&v, lane, one, one + last, 0, last, &strayed) == CAV_OK);
+    printf("pole held by %s: %.3g of what loses it\n", k == 0 ? "the first" : k == 1 ? "the second" : "both", strayed);
+    CHECK(k < 2 ? strayed >= 1 : strayed < 1e-6);
+    cav_lane_free(lane);
+  }
+  free(gain);
+  cav_verification_end(&v);
+  cav_trajectory_free(motion);
+  cav_transcription_free(tr);
+  cav_model_free(model);
+}
+
 static double chance(void) { return 0.5 + 0.5 * scene_uniform(); }
 
 static void draw(double lost, double far) {
-  for (int i = 0; i < TRIALS; i++)
+  for (int i = 0; i <= TOGETHER; i++)
     for (int k = 0; k < CAV_LOOPS; k++) {
       struct cav_follow *f = &drawn[i][k];
       *f = (struct cav_follow){.seconds = duration, .error = far * chance()};
@@ -74,26 +138,29 @@ static void outcome(int i, int *follows, double *seconds, double *error) {
   }
 }
 
-/// The trial that the rule keeps, and how many it takes.
-static int expected(int *trials) {
+/// The trial that the rule keeps, and how many sets it takes; *ends: 1 where it ends with the ones put together.
+static int expected(int *trials, int *ends) {
   int best = -1, follows = 0;
   double seconds = 0, error = 0;
-  for (*trials = 1; *trials <= TRIALS; ++*trials) {
-    int f;
-    double s, e;
-    outcome(*trials - 1, &f, &s, &e);
-    if (best < 0 || f > follows || (f == follows && (f < CAV_LOOPS ? s > seconds : e < error)))
-      best = *trials - 1, follows = f, seconds = s, error = e;
-    // what no set follows from its own start
-    if (*trials >= (seconds < 0.85 * duration ? PLAIN : UNHELD) && follows == CAV_LOOP_OWN) return best;
-    if (follows < (*trials <= FEW ? CAV_LOOPS : CAV_LOOP_PUSHED)) continue;
-    if (error <= 0.05 + 0.03 * (*trials - 1)) return best;
-  }
-  *trials = TRIALS;
+  for (*trials = 1; *trials <= TRIALS; ++*trials)
+    for (*ends = 0; *ends < (*trials == ROLLED ? 2 : 1); ++*ends) {
+      int f;
+      double s, e;
+      const int now = *ends ? TOGETHER : *trials - 1;
+      outcome(now, &f, &s, &e);
+      if (best < 0 || f > follows || (f == follows && (f < CAV_LOOPS ? s > seconds : e < error)))
+        best = now, follows = f, seconds = s, error = e;
+      // what no set follows from its own start
+      if (*trials >= (seconds < 0.85 * duration ? PLAIN : UNHELD) && follows == CAV_LOOP_OWN) return best;
+      if (follows < (*trials <= FEW ? CAV_LOOPS : CAV_LOOP_PUSHED)) continue;
+      if (error <= 0.05 + 0.03 * (*trials - 1)) return best;
+    }
+  *trials = TRIALS, *ends = 0;
   return best;
 }
 
 int main(void) {
+  test_pole();
   cav_model *model = scene_load(cart);
   cav_problem problem = cav_problem_default(model);
   double still = 0;
@@ -104,30 +171,31 @@ int main(void) {
   cav_transcription *tr = cav_transcription_new(&problem, 1, NULL);
   cav_trajectory *motion = cav_trajectory_new(model, tr->nknot, problem.timestep);
   for (int k = 0; k < 300; k++) {
-    int trials, whole = 0;
+    int trials, ends, whole = 0;
     if (k == 0)
       draw(0, 0.05);
     else
       draw(0.02 * (k % 20), k % 3 ? 0.5 : 2);
-    const int best = expected(&trials);
-    for (int i = 0; i < trials; i++) {
+    const int best = expected(&trials, &ends);
+    const int rolls = trials > ROLLED || ends;
+    for (int i = 0; i < trials + rolls; i++) {
       int follows;
       double seconds, error;
-      outcome(i, &follows, &seconds, &error);
+      outcome(i < trials ? i : TOGETHER, &follows, &seconds, &error);
       whole += follows < CAV_LOOPS ? follows + 1 : CAV_LOOPS;
     }
     cav_solution solution = {.contact = tr->options};
     cav_error error = {0};
     int follows, first;
     double seconds, off;
-    run = 0;
+    run = together = 0;
     CHECK(cav_choose_gains(&problem, tr, motion, 0, next, NULL, &solution, &follows, &error) == CAV_OK);
     outcome(best, &first, &seconds, &off);
     CHECK(follows == (first >= CAV_LOOP_START));
-    CHECK(trial == trials - 1);
+    CHECK(trial == (ends ? TOGETHER : trials - 1) && together == (rolls ? ROLLED : 0));
     if (CHECK(solution.gain_q)) CHECK((int)*solution.gain_q == best);
     // a loop out of its order is one more at most
-    CHECK(run <= whole + trials);
+    CHECK(run <= whole + trials + rolls);
     // where the first set serves, each loop once
     if (k == 0) CHECK(trials == 1 && run == CAV_LOOPS);
     cav_gains_free(&solution);
@@ -148,7 +216,7 @@ int main(void) {
     int trials;
   } lost[] = {{0.8, TRIALS, PLAIN}, {0.9, TRIALS, UNHELD}, {0.9, PLAIN + 10, TRIALS}, {0.8, PLAIN + 10, PLAIN}};
   for (size_t n = 0; n < sizeof lost / sizeof *lost; n++) {
-    for (int i = 0; i < TRIALS; i++)
+    for (int i = 0; i <= TOGETHER; i++)
       for (int k = 0; k < CAV_LOOPS; k++)
         drawn[i][k] = (struct cav_follow){.seconds = lost[n].part * duration, .lost = "lost"};
     for (int i = lost[n].held; i < TRIALS; i++) *drawn[i][CAV_LOOP_OWN].lost = 0;

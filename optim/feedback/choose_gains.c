@@ -11,6 +11,7 @@
 #include <string.h>
 
 #include "lqr.h"
+#include "rollout.h"
 #include "schedule.h"
 #include "verification.h"
 
@@ -20,6 +21,9 @@ enum { LAWS = 2, FEW = 3, PLAIN = 40 };
 /// Sets that are tried at most: in all; where none so far follows from the motion's own start, PLAIN where the motion is lost
 /// early and UNHELD else.
 enum { TRIALS = 120, UNHELD = 64 };
+
+/// Where none of so many sets does, these are put together (rollout.c).
+enum { ROLLED = 12 };
 
 /// What a regulator is made of: penalties on straying, and the fractions of the schedule whose contact laws it reckons
 /// with.
@@ -81,7 +85,8 @@ typedef struct search {
   cav_before before; ///< where loops of the set in hand are pushed
   set best;
   outcome reached;
-  int found; ///< 1: there is a best
+  int found;            ///< 1: there is a best
+  double *kept[ROLLED]; ///< [2*n] gains of the first sets, if they may be put together
 } search;
 
 /// The regulator of a set, into gain.
@@ -108,13 +113,14 @@ static void note(outcome *now, int loop, const struct cav_follow *follow) {
   }
 }
 
-/// Tries a set and keeps it if it is better. Loops in their order but for the one that decided about the best, which is
-/// first; what is known so far is the most that the set can do.
-static cav_status try(search *s, const set *one) {
+/// Runs the loops of the gains at hand and keeps these if they are better; *better_so: whether they are. Loops in their order
+/// but for the one that decided about the best, which is first; what is known so far is the most that the gains can do.
+static cav_status check_loops(search *s, int *better_so) {
   outcome now = {.follows = CAV_LOOPS};
-  cav_status status = regulate(s, one);
   const int first = s->reached.decided;
+  cav_status status = CAV_OK;
   s->before.known = 0;
+  *better_so = 0;
   for (int k = 0; k < CAV_LOOPS && status == CAV_OK; k++) {
     const int loop = k == 0 ? first : k <= first ? k - 1 : k;
     if (k > 0 && loop >= now.follows) break;
@@ -127,10 +133,31 @@ static cav_status try(search *s, const set *one) {
   memcpy(s->solution->gain_q, s->gain, s->n * sizeof *s->gain);
   memcpy(s->solution->gain_v, s->gain + s->n, s->n * sizeof *s->gain);
   memcpy(s->best_follow, s->follow, sizeof s->follow);
-  s->best = *one;
   s->reached = now;
-  s->found = 1;
+  s->found = *better_so = 1;
   return CAV_OK;
+}
+
+/// Tries a set; of these the best is what others are near.
+static cav_status try(search *s, const set *one) {
+  int better_so = 0;
+  cav_status status = regulate(s, one);
+  if (status == CAV_OK) status = check_loops(s, &better_so);
+  if (better_so) s->best = *one;
+  return status;
+}
+
+/// Keeps the gains at hand, those of the last of so many sets; what all of these make together is tried.
+static cav_status roll(search *s, int sets) {
+  if (sets > ROLLED) return CAV_OK;
+  double *kept = malloc(2 * s->n * sizeof *kept);
+  s->kept[sets - 1] = kept;
+  if (!kept) return CAV_NO_MEMORY;
+  memcpy(kept, s->gain, 2 * s->n * sizeof *kept);
+  if (sets < ROLLED) return CAV_OK;
+  int better_so;
+  cav_status status = cav_rollout(s->tr, &s->verification, sets, (const double *const *)s->kept, s->gain);
+  return status == CAV_OK ? check_loops(s, &better_so) : status;
 }
 
 /// x in [0, 1] between two ends, around a middle within a part of the way, or anywhere.
@@ -205,8 +232,12 @@ cav_status cav_choose_gains(const cav_problem *problem, const cav_transcription 
   for (int i = 0; i < trials && status == CAV_OK; i++) {
     const set one = sample(&s, i);
     status = report(context, i + 1, trials) ? CAV_INTERRUPTED : try(&s, &one);
+    // pieces of a cycle are those of its next period, too
+    const int rolls = trials >= ROLLED && !problem->cycle.on;
+    if (status == CAV_OK && rolls && !done(&s, i + 1)) status = roll(&s, i + 1);
     if (done(&s, i + 1)) break;
   }
+  for (int i = 0; i < ROLLED; i++) free(s.kept[i]);
   if (follows) *follows = s.found && s.reached.follows >= CAV_LOOP_START;
   if (s.found && s.reached.follows >= CAV_LOOP_PUSHED && !problem->cycle.on) {
     solution->followed = cav_followed_new(&s.verification, solution->gain_q, solution->gain_v, s.best_follow);

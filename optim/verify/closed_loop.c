@@ -95,6 +95,11 @@ cav_status cav_closed_loop(const cav_verification *verification, int loop, const
   return cav_replay_own(verification, 0, gain_q, gain_v, &disturbance, follow);
 }
 
+cav_lane *cav_closed_loop_lane(const cav_verification *verification, int loop) {
+  if (loop == CAV_LOOP_CLAIMED) return cav_lane_claimed(verification);
+  return cav_lane_own(verification, loop == CAV_LOOP_FINE, loop < CAV_LOOP_START ? 0 : loop - CAV_LOOP_START + 1);
+}
+
 cav_status cav_closed_loops_own(const cav_verification *verification, const struct cav_follow *known,
                                 const double *gain_q, const double *gain_v, struct cav_follow *follow) {
   *follow = (struct cav_follow){0};

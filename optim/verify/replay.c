@@ -314,13 +314,13 @@ static cav_trajectory *finer(const cav_verification *verification, double h) {
 
 // a simulation under way
 typedef struct simulation {
-  const cav_trajectory *motion; ///< at the finer step
+  cav_trajectory *motion; ///< at the finer step
   const double *gain_q, *gain_v;
   const cav_disturbance *push; ///< within the next step, or NULL
   const cav_options *law;      ///< claimed, or NULL: the model's own
   cav_state *state;
-  double *q, *v;
-  double *a; ///< mean acceleration of the last step, from which the next is guessed; 0 before the first
+  double *q, *v; ///< q owns the room of all
+  double *a;     ///< mean acceleration of the last step, from which the next is guessed; 0 before the first
   double *dq, *dv, *u, *next, *control, *place;
 } simulation;
 
@@ -418,38 +418,95 @@ static void keep(const cav_disturbance *disturbance, size_t n, const double *q) 
   disturbance->before->known = 1;
 }
 
+// a simulation at the motion's start, or a little off; to be put away in any case
+static cav_status set_out(const cav_verification *verification, const cav_options *law, double h, int start,
+                          simulation *s) {
+  const cav_model *model = verification->model;
+  size_t nq = (size_t)model->nq, nv = (size_t)model->nv;
+  *s = (simulation){.motion = finer(verification, h), .law = law, .state = cav_state_new(model)};
+  s->q = malloc(sizeof(double) * (nq + 7 * nv + (size_t)model->nu + 7 * (size_t)model->nlink));
+  if (!s->q || !s->state || !s->motion) return CAV_NO_MEMORY;
+  s->v = s->q + nq, s->a = s->v + nv;
+  s->dq = s->a + nv, s->dv = s->dq + nv, s->u = s->dv + nv, s->next = s->u + nv, s->control = s->next + 2 * nv;
+  s->place = s->control + model->nu;
+  memcpy(s->q, verification->q, sizeof(double) * nq);
+  memcpy(s->v, verification->v, sizeof(double) * nv);
+  memset(s->a, 0, sizeof(double) * nv);
+  if (start) move_start(model, start, s->q, s->v);
+  return CAV_OK;
+}
+
+static void put_away(simulation *s) {
+  cav_trajectory_free(s->motion);
+  cav_state_free(s->state);
+  free(s->q);
+}
+
 // a simulation to its end; disturbance NULL: none
 static cav_status closed(const cav_verification *verification, const cav_options *law, double h, const double *gain_q,
                          const double *gain_v, const cav_disturbance *disturbance, struct cav_follow *follow) {
   const cav_disturbance *push = disturbance && disturbance->link ? disturbance : NULL;
-  const cav_model *model = verification->model;
-  size_t nq = (size_t)model->nq, nv = (size_t)model->nv;
-  double *q = malloc(sizeof(double) * (nq + 7 * nv + (size_t)model->nu + 7 * (size_t)model->nlink));
-  cav_state *state = cav_state_new(model);
-  cav_trajectory *motion = finer(verification, h);
-  cav_status status = q && state && motion ? CAV_OK : CAV_NO_MEMORY;
+  const size_t n = cav_before_numbers(verification);
+  simulation s;
+  cav_status status = set_out(verification, law, h, disturbance ? disturbance->start : 0, &s);
   *follow = (struct cav_follow){0};
   if (status == CAV_OK) {
-    simulation s = {.motion = motion, .gain_q = gain_q, .gain_v = gain_v, .law = law, .state = state};
-    s.q = q, s.v = q + nq, s.a = s.v + nv;
-    s.dq = s.a + nv, s.dv = s.dq + nv, s.u = s.dv + nv, s.next = s.u + nv, s.control = s.next + 2 * nv;
-    s.place = s.control + model->nu;
-    memcpy(s.q, verification->q, sizeof(double) * nq);
-    memcpy(s.v, verification->v, sizeof(double) * nv);
-    memset(s.a, 0, sizeof(double) * nv);
-    if (disturbance && disturbance->start) move_start(model, disturbance->start, s.q, s.v);
-    const int hit = disturbance ? (int)(disturbance->fraction * (motion->nknot - 1)) : 0;
-    int on = 1, i = go_on(push, hit, nq + 2 * nv, s.q);
-    status = cav_position(model, verification->bare, s.q);
-    for (; i + 1 < motion->nknot && on && status == CAV_OK; i++) {
+    s.gain_q = gain_q, s.gain_v = gain_v;
+    const int hit = disturbance ? (int)(disturbance->fraction * (s.motion->nknot - 1)) : 0;
+    int on = 1, i = go_on(push, hit, n, s.q);
+    status = cav_position(verification->model, verification->bare, s.q);
+    for (; i + 1 < s.motion->nknot && on && status == CAV_OK; i++) {
       s.push = push && i == hit ? push : NULL;
-      if (disturbance && i == hit) keep(disturbance, nq + 2 * nv, s.q);
+      if (disturbance && i == hit) keep(disturbance, n, s.q);
       status = advance(verification, &s, i, follow, &on);
     }
   }
-  cav_trajectory_free(motion);
-  cav_state_free(state);
-  free(q);
+  put_away(&s);
+  return status;
+}
+
+struct cav_lane {
+  simulation s;
+};
+
+static cav_lane *lane(const cav_verification *verification, const cav_options *law, double h, int start) {
+  cav_lane *l = malloc(sizeof *l);
+  if (l && set_out(verification, law, h, start, &l->s) == CAV_OK) return l;
+  cav_lane_free(l);
+  return NULL;
+}
+
+cav_lane *cav_lane_claimed(const cav_verification *verification) {
+  return lane(verification, &verification->law, verification->h / SUBSTEPS, 0);
+}
+
+cav_lane *cav_lane_own(const cav_verification *verification, int finer, int start) {
+  return lane(verification, NULL, own_step[finer], start);
+}
+
+void cav_lane_free(cav_lane *l) {
+  if (l) put_away(&l->s);
+  free(l);
+}
+
+double *cav_lane_state(cav_lane *l) { return l->s.q; }
+
+cav_status cav_lane_run(const cav_verification *verification, cav_lane *l, const double *gain_q, const double *gain_v,
+                        int from, int to, double *strayed) {
+  const cav_model *model = verification->model;
+  simulation *s = &l->s;
+  const double finer = verification->h / s->motion->timestep;
+  const int end = (int)fmin(round(to * finer), s->motion->nknot - 1);
+  struct cav_follow follow = {0};
+  int on = 1, i = (int)lround(from * finer);
+  s->gain_q = gain_q, s->gain_v = gain_v, s->push = NULL;
+  cav_status status = cav_position(model, verification->bare, s->q);
+  for (; i < end && on && status == CAV_OK; i++) status = advance(verification, s, i, &follow, &on);
+  *strayed = 1 + (end - i) * s->motion->timestep;
+  if (!on || status != CAV_OK) return status;
+  gap now;
+  status = compare(verification, s->motion->q + end * model->nq, s->q, s->place, &now);
+  *strayed = fmin(fmax(now.distance / CAV_LOST_DISTANCE, now.rotation / turned), 1);
   return status;
 }
 

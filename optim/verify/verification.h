@@ -266,6 +266,21 @@ enum { CAV_STARTS = 4 };
 cav_status cav_replay_own(const cav_verification *verification, int finer, const double *gain_q, const double *gain_v,
                           const cav_disturbance *disturbance, struct cav_follow *follow);
 
+/// Such a loop that is taken on by pieces, or one under the claimed law at a tenth of the step: NULL, no memory. start: as of a
+/// disturbance.
+typedef struct cav_lane cav_lane;
+cav_lane *cav_lane_own(const cav_verification *verification, int finer, int start);
+cav_lane *cav_lane_claimed(const cav_verification *verification);
+void cav_lane_free(cav_lane *lane);
+
+/// Where it stands, as in cav_before: to be kept, and set to what was.
+double *cav_lane_state(cav_lane *lane);
+
+/// On from one knot to another. *strayed: how far it is then, of what loses it; where it is lost 1 and the seconds that are
+/// missing.
+cav_status cav_lane_run(const cav_verification *verification, cav_lane *lane, const double *gain_q,
+                        const double *gain_v, int from, int to, double *strayed);
+
 /// The closed loops of a motion with its gains, for their choice: those of a verification, the last of which start off,
 /// and then two small pushes. closed_loop.c.
 enum {
@@ -284,6 +299,9 @@ cav_status cav_closed_loops_begin(cav_verification *verification, const cav_prob
                                   const cav_trajectory *trajectory, const cav_options *contact, cav_error *error);
 cav_status cav_closed_loop(const cav_verification *verification, int loop, const double *gain_q, const double *gain_v,
                            cav_before *before, struct cav_follow *follow);
+
+/// The loop before the pushes, for pieces.
+cav_lane *cav_closed_loop_lane(const cav_verification *verification, int loop);
 
 /// The worst of those under the contacts of the model's file at each of the steps and from each of the starts that are off;
 /// where it is lost in one, the first of these. known: those of all loops before the pushes, or NULL: they are run.
