@@ -78,28 +78,27 @@ static void put_first(rollout *r, int lane) {
   r->order[0] = lane;
 }
 
-/// The regulator by which the loops stray least, to r->best where these stand at the end of the piece; *chosen: which it is.
-/// Those by which the first lane strays least are tried first, so that most others are known to be worse by that lane alone.
+/// The regulator by which the loops stray least, *least, to r->best where these stand at the end of the piece; *chosen: which it
+/// is. Those by which the first lane strays least are tried first, so that most others are known to be worse by it alone.
 static cav_status choose(rollout *r, const cav_transcription *tr, int sets, const double *const *set, size_t n,
-                         const int knot[3], int *chosen) {
-  double least = INFINITY;
+                         const int knot[3], int *chosen, double *least) {
   int worst = 0, first = r->order[0];
   cav_status status = CAV_OK;
-  for (int k = 0; k < sets && status == CAV_OK; k++) {
+  *least = INFINITY;
+  for (int k = 0; k < sets && status == CAV_OK; k++)
     status = cav_transcription_stopped(tr) ? CAV_INTERRUPTED
                                            : take_on(r, r->order[0], set[k], set[k] + n, knot, &r->first[k]);
-  }
   for (int i = 0; i < sets && status == CAV_OK; i++) {
     int k = 0;
     for (int j = 1; j < sets; j++)
       if (r->first[j] < r->first[k]) k = j;
-    if (r->first[k] >= least) break;
+    if (r->first[k] >= *least) break;
     r->first[k] = INFINITY;
     double strayed;
     status =
-        cav_transcription_stopped(tr) ? CAV_INTERRUPTED : stray(r, set[k], set[k] + n, knot, least, &strayed, &worst);
-    if (status != CAV_OK || strayed >= least) continue;
-    least = strayed, *chosen = k, first = worst;
+        cav_transcription_stopped(tr) ? CAV_INTERRUPTED : stray(r, set[k], set[k] + n, knot, *least, &strayed, &worst);
+    if (status != CAV_OK || strayed >= *least) continue;
+    *least = strayed, *chosen = k, first = worst;
     memcpy(r->best, r->end, LANES * r->numbers * sizeof(double));
   }
   put_first(r, first);
@@ -117,13 +116,17 @@ cav_status cav_rollout(const cav_transcription *tr, const cav_verification *veri
   cav_status status = begin(&r, sets);
   for (int k = 0; k < LANES && status == CAV_OK; k++)
     memcpy(of(&r, r.best, k), cav_lane_state(r.lane[k]), r.numbers * sizeof(double));
-  for (int t = 0; t < last && status == CAV_OK; t += length) {
-    const int knot[3] = {t, t + length < last ? t + length : last, t + look < last ? t + look : last};
+  for (int t = 0; t < last && status == CAV_OK;) {
+    int knot[3] = {t, t + length < last ? t + length : last, t + look < last ? t + look : last};
+    double strayed;
     memcpy(r.begin, r.best, LANES * r.numbers * sizeof(double));
-    status = choose(&r, tr, sets, set, n, knot, &chosen);
+    status = choose(&r, tr, sets, set, n, knot, &chosen, &strayed);
+    // lost before the piece ends: what follows does not matter
+    if (strayed >= 1 + (knot[2] - knot[1]) * h) knot[1] = last;
     const size_t at = (size_t)t * block, some = (size_t)(knot[1] - t) * block;
     memcpy(gain + at, set[chosen] + at, some * sizeof *gain);
     memcpy(gain + n + at, set[chosen] + n + at, some * sizeof *gain);
+    t = knot[1];
   }
   end(&r);
   return status;

@@ -503,11 +503,13 @@ cav_status cav_lane_run(const cav_verification *verification, cav_lane *l, const
   cav_status status = cav_position(model, verification->bare, s->q);
   for (; i < end && on && status == CAV_OK; i++) status = advance(verification, s, i, &follow, &on);
   *strayed = 1 + (end - i) * s->motion->timestep;
-  if (!on || status != CAV_OK) return status;
   gap now;
-  status = compare(verification, s->motion->q + end * model->nq, s->q, s->place, &now);
-  *strayed = fmin(fmax(now.distance / CAV_LOST_DISTANCE, now.rotation / turned), 1);
-  return status;
+  if (on && status == CAV_OK) {
+    status = compare(verification, s->motion->q + end * model->nq, s->q, s->place, &now);
+    if (status == CAV_OK) *strayed = fmin(fmax(now.distance / CAV_LOST_DISTANCE, now.rotation / turned), 1);
+  }
+  // what has left all numbers is lost
+  return status == CAV_NO_MEMORY ? status : CAV_OK;
 }
 
 cav_status cav_replay_closed(const cav_verification *verification, const cav_options *law, const double *gain_q,
