@@ -98,7 +98,7 @@ static void test_pole(void) {
     }
   CHECK(__real_cav_rollout(tr, &v, 2, set, rolled) == CAV_OK);
   for (int k = 0; k < 3; k++) {
-    double strayed;
+    double strayed = 0;
     const double *one = k < 2 ? set[k] : rolled;
     cav_lane *lane = cav_lane_own(&v, 0, 1);
     CHECK(lane && cav_lane_run(&v, lane, one, one + last, 0, last, &strayed) == CAV_OK);
