@@ -72,12 +72,10 @@ static int next(void *context, int set, int most) {
 /// throws it over.
 static void test_pole(void) {
   static const char pole[] =
-      "<mujoco><worldbody><body><joint type='hinge' axis='0 1 0'/><geom type='capsule' fromto='0 0 0 0 0 1' size='.05' "
+      "<mujoco><worldbody><body><joint name='x' type='hinge' axis='0 1 0'/><geom type='capsule' fromto='0 0 0 0 0 1' "
+      "size='.05' "
       "mass='1' contype='0' conaffinity='0'/></body></worldbody><actuator><motor joint='x'/></actuator></mujoco>";
-  char text[sizeof pole + 16];
-  const char *hinge = strstr(pole, "type='hinge'");
-  snprintf(text, sizeof text, "%.*sname='x' %s", (int)(hinge - pole), pole, hinge);
-  cav_model *model = scene_load(text);
+  cav_model *model = scene_load(pole);
   cav_problem problem = cav_problem_default(model);
   double still = 0;
   problem.timestep = 0.02, problem.duration = 2;

@@ -2,6 +2,7 @@
 /// contacts are that it counts on, are not in the problem. So sets of these are tried in closed loops: those of
 /// verification, some of which start a little off, and two with a small push: gains that fit one course of the
 /// simulation may lose the next. A few that serve different motions come first, then points that fill the range of all.
+/// Where none of the first does, they are put together (rollout.c).
 /// The first that follows in all loops and ends near enough is taken; that it withstands the pushes is asked of the
 /// first few alone, and what is near enough grows with the number of sets. Kept is what follows in most loops, in their
 /// order, then what ends nearest in the worst of them. A trial begins with the loop that decided about the best so far,

@@ -495,10 +495,10 @@ cav_status cav_lane_run(const cav_verification *verification, cav_lane *l, const
                         int from, int to, double *strayed) {
   const cav_model *model = verification->model;
   simulation *s = &l->s;
-  const double finer = verification->h / s->motion->timestep;
-  const int end = (int)fmin(round(to * finer), s->motion->nknot - 1);
+  const double steps = verification->h / s->motion->timestep;
+  const int end = (int)fmin(round(to * steps), s->motion->nknot - 1);
   struct cav_follow follow = {0};
-  int on = 1, i = (int)lround(from * finer);
+  int on = 1, i = (int)lround(from * steps);
   s->gain_q = gain_q, s->gain_v = gain_v, s->push = NULL;
   cav_status status = cav_position(model, verification->bare, s->q);
   for (; i < end && on && status == CAV_OK; i++) status = advance(verification, s, i, &follow, &on);

@@ -165,8 +165,7 @@ cav_status cav_command_print_stance(const cav_problem *p, const char *name, cons
   if (off > leaning)
     printf(
         "  note: the %s as it stands would fall: its centre of mass is %.2g m beside all that bears it; a seat, a box "
-        "or a "
-        "hand has to touch there\n",
+        "or a hand has to touch there\n",
         name, off);
   cav_state_free(state);
   return CAV_OK;
