@@ -229,6 +229,44 @@ static double depth_in_table(const cav_problem *p, double aside) {
   return deepest;
 }
 
+/// A box on the floor that is to stand on a table: hands lead it over the table's edge though its straight way runs into the
+/// table and the humanoid turns, for which others are begun by a gait; the root stoops for it, and is kept at its height for one
+/// on a table.
+static void test_from_floor(void) {
+  for (int high = 0; high < 2; high++) {
+    cav_problem *p = load(high ? "../unseen/box-to-shelf" : "../unseen/box-to-table");
+    if (!p) continue;
+    cav_strategy strategy[CAV_STRATEGIES];
+    cav_carry c;
+    int n;
+    CHECK(cav_carry_find(p, 1, &c) == CAV_OK && c.lifts && c.over > 0 && c.found == 4 + high);
+    CHECK(cav_strategy_list(p, strategy, &n) == CAV_OK && strategy[0].hand == 2);
+    CHECK(high || strategy_find(strategy, n, "step"));
+    cav_strategies_clear(strategy, n);
+    cav_problem_free(p);
+  }
+}
+
+/// A ball to which a term brings a foot lies until then, and no hand is led to it; where the foot is asked for elsewhere one is.
+static void test_met(void) {
+  for (int away = 0; away < 2; away++) {
+    cav_problem *p = load("kick");
+    if (!p) continue;
+    cav_strategy strategy[CAV_STRATEGIES];
+    double target[3] = {0.05, -0.085, 0.1};
+    for (int i = 0; i < p->nterm && away; i++)
+      if (!strcmp(p->term[i].name, "foot at the ball")) p->term[i].target = target;
+    int n;
+    CHECK(cav_strategy_list(p, strategy, &n) == CAV_OK);
+    CHECK(strategy[0].met == (away ? 0 : 0.8) && strategy[0].hand == (away ? 2 : 0));
+    const int ball = cav_object_find(p->model, CAV_OBJECT_BODY, "ball");
+    CHECK(away || p->model->joint[strategy[0].moved].body == ball);
+    CHECK(!away == (strategy_find(strategy, n, "push") != NULL));
+    cav_strategies_clear(strategy, n);
+    cav_problem_free(p);
+  }
+}
+
 /// A box far across a table: arms of 0.57 m do not reach it, and the body comes as near as the table lets it, in eighths of the
 /// way. It is lifted straight up.
 static void test_edge(void) {
@@ -324,6 +362,8 @@ int main(void) {
   test_both();
   test_door();
   test_edge();
+  test_from_floor();
+  test_met();
   test_over();
   test_begun();
   test_none();

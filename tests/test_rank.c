@@ -5,8 +5,8 @@
 
 // one that keeps every condition of a certificate
 static cav_race_report whole(void) {
-  return (cav_race_report){.solution = 1,
-                           .verdict = {.closed_loop_seconds = 2, .model_contacts_seconds = 2, .duration = 2}};
+  return (cav_race_report){
+      .solution = 1, .verdict = {.has_gains = 1, .closed_loop_seconds = 2, .model_contacts_seconds = 2, .duration = 2}};
 }
 
 // what is missed later, by however much, is the better one, and of the same the lesser; what is kept is not compared
@@ -116,7 +116,8 @@ static void test_worth(void) {
 }
 
 // mending is put off once it has taken longer than what it mends, and goes on when more was solved
-// what is certified and misses little is mended before anything is sought, however long that took so far
+// what is certified, or left before gains were chosen since it misses a target alone, and misses little is mended before anything
+// is sought, however long that took so far
 static void test_close(void) {
   cav_race_report r = {.solution = 1};
   r.verdict.certified = 1, r.verdict.ntarget = 3, r.verdict.nmissed = 1, r.verdict.missed_most = 1.25;
@@ -124,7 +125,11 @@ static void test_close(void) {
   r.verdict.missed_most = 1.01 * CAV_MISSED_LITTLE;
   CHECK(!cav_rank_close(&r));
   r.verdict.missed_most = 1.25, r.verdict.certified = 0;
-  CHECK(!cav_rank_close(&r));
+  CHECK(cav_rank_beside(&r.verdict) && cav_rank_close(&r) && cav_rank_near(&r, 0.8));
+  r.verdict.has_gains = 1;
+  CHECK(!cav_rank_beside(&r.verdict) && !cav_rank_close(&r));
+  r.verdict.has_gains = 0, r.verdict.slip_mean_m_s = 1.1 * CAV_TOLERANCE_SLIP;
+  CHECK(!cav_rank_beside(&r.verdict) && !cav_rank_close(&r));
 }
 
 static void test_spent(void) {
@@ -244,7 +249,7 @@ static void test_nearer(void) {
   cav_race_report left = whole(), lost = whole();
   left.verdict.certified = lost.verdict.certified = 0;
   left.verdict.slip_mean_m_s = 2 * CAV_TOLERANCE_SLIP, lost.verdict.slip_mean_m_s = 3 * CAV_TOLERANCE_SLIP;
-  left.verdict.closed_loop_seconds = left.verdict.model_contacts_seconds = 0;
+  left.verdict.has_gains = 0, left.verdict.closed_loop_seconds = left.verdict.model_contacts_seconds = 0.1;
   CHECK(cav_rank_nearer(&left, &lost) && !cav_rank_nearer(&lost, &left));
   // what is not certified comes after them
   other.verdict.certified = 0, other.verdict.slip_mean_m_s = 2 * CAV_TOLERANCE_SLIP;

@@ -153,9 +153,9 @@ typedef struct cav_solve_options {
                   ///< fraction of the cost, by the model of cav_verify_optimality; 0: where none gains
   int diagnose; ///< 1: where constraints cannot all hold, end at their least violation, which cav_explain needs
   /// 1: with gains, a motion whose constraints hold, but that no gains would certify, for its slip, hover, depth or
-  /// momentum, is made no cheaper and has none; nor is one that is stuck and that no set of a few gains follows, or that
-  /// misses what it is asked to reach, which has the best of them: who goes on to another one loses nothing by it. Of the own
-  /// solver.
+  /// momentum, or that misses what it is asked to reach by less than CAV_MISSED_LITTLE tolerances, is made no cheaper and has
+  /// none; nor is one that is stuck and that no set of a few gains follows, or that misses a target, which has the best of
+  /// them: who goes on to another one loses nothing by it. Of the own solver.
   int leave_refused;
   /// Of the dynamics: analytic, and what has none (cav_derivatives_missing, sensors) by one-sided differences, or all
   /// by differences. Ipopt always takes centred ones.
@@ -375,13 +375,16 @@ typedef struct cav_strategy {
   int nreach; ///< joints of a guess that ends elsewhere than at the goal: where terms of the end ask
   cav_joint_value reach[CAV_STRATEGY_SWINGS]; ///< [nreach]
   int ground;                                 ///< 1: its guess stands on what is below it
-  int samples;             ///< it begins with the best of many simulated motions, other draws by number; 0: it does not
-  int hand;                ///< hands that are brought first to what has to be pushed, carried or touched: 1 or 2
-  double height, from, to; ///< not stated: of a ballistic arc, m, and when, s
-  double bow[2];           ///< not stated: cav_problem.guess_bow, over the whole way
-  int flies;               ///< 1: start and goal are held before and after that arc
-  cav_guess_pose pose[2];  ///< where it flies
-  cav_schedule schedule;   ///< schedule that it takes
+  int samples; ///< it begins with the best of many simulated motions, other draws by number; 0: it does not
+  int hand;    ///< hands that are brought first to what has to be pushed, carried or touched: 1 or 2
+  double
+      met; ///< s: until then what is moved stays as it is at the start in the guess, since a term brings something to it; or 0
+  int moved;                     ///< with met, its joint
+  double height, from, to;       ///< not stated: of a ballistic arc, m, and when, s
+  double bow[2];                 ///< not stated: cav_problem.guess_bow, over the whole way
+  int flies;                     ///< 1: start and goal are held before and after that arc
+  cav_guess_pose pose[2];        ///< where it flies
+  cav_schedule schedule;         ///< schedule that it takes
   double effort_limit, timestep; ///< those of the problem where 0
   double strength;               ///< a diagnosis: cav_problem.strength
   int open;                      ///< 1: a diagnosis that need not end at rest; 0 without strength: may last longer
@@ -497,6 +500,7 @@ typedef struct cav_verdict {
   double replay_same_step_seconds;   ///< how long it stays within 1e-6
   double
       closed_loop_seconds; ///< how long the closed loop at a tenth of the step follows (all links within 0.5 m, roots 1 rad)
+  int has_gains;           ///< 1: the closed loops had gains; 0: without, what was planned alone is applied
   double closed_loop_end_error_m; ///< largest distance of a body's centre of mass at the end
   double model_contacts_seconds,
       model_contacts_end_error_m; ///< the same under the contacts of the model's file: the worst of steps of 2 and 1 ms, and of

@@ -17,6 +17,9 @@ static const double weight = 300;
 /// m: what is nearer touches; vertical part of a normal by which it bears.
 static const double touching = 2e-3, upward = 0.7;
 
+/// m from a surface: what is asked for so near is brought to it.
+static const double brought = 0.2;
+
 /// Whether no actuator moves a link that can move.
 static int is_left(const cav_model *m, int link) { return link > 0 && !m->link[link].driven; }
 
@@ -176,6 +179,27 @@ static cav_status find_bearer(const cav_problem *p, int link, int *borne) {
   return status;
 }
 
+/// When a term first brings something driven to where a link is at the start, as a foot to a ball that is to be kicked.
+static cav_status find_met(const cav_problem *p, cav_state *state, cav_thing *thing) {
+  const cav_model *m = p->model;
+  cav_status status = cav_position(m, state, p->q_start);
+  for (int i = 0; i < p->nterm && !status; i++) {
+    const cav_term *term = &p->term[i];
+    const int link = cav_term_placed(m, term);
+    if (link <= 0 || !m->link[link].driven || term->component >= 0 || term->use == CAV_USE_RANGE) continue;
+    if (!cav_term_asks(term)) continue;
+    if (!(term->from > 0 && term->from < thing->time) || (thing->met > 0 && term->from >= thing->met)) continue;
+    double target[CAV_SENSOR_DIM_MAX], centre[3], n[3], lowest;
+    cav_term_target(term, term->from, 3, target);
+    centre_of(m, state, thing->link, centre);
+    sub3(n, target, centre);
+    const double far = norm3(n);
+    normalise3(n);
+    if (far <= cav_thing_surface(m, state, thing->link, n, centre, &lowest) + brought) thing->met = term->from;
+  }
+  return status;
+}
+
 cav_status cav_thing_find(const cav_problem *problem, int lifted, cav_state *state, cav_thing *thing) {
   *thing = (cav_thing){.link = 0, .joint = -1};
   int borne = 0;
@@ -184,6 +208,7 @@ cav_status cav_thing_find(const cav_problem *problem, int lifted, cav_state *sta
   if (!status && !thing->link) status = find_of_goal(problem, lifted, state, thing);
   if (!status && thing->link) status = find_bearer(problem, thing->link, &borne);
   if (borne) thing->link = 0;
+  if (!status && thing->link) status = find_met(problem, state, thing);
   return status;
 }
 

@@ -12,6 +12,8 @@ typedef struct cav_thing {
   double first;  ///< s, when it is first asked for elsewhere
   double time;   ///< s, when it is asked for last
   double rise;   ///< m, how far over where it is at the start it is asked for at any time
+  double
+      met; ///< s, when a term first brings something driven to where it is at the start, before it is asked for; 0: none does
 } cav_thing;
 
 /// m: a way from which a thing has to be moved.

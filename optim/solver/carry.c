@@ -33,6 +33,9 @@ static const double pace = 0.8, least_step = 0.05, shallow = 1e-3;
 /// for which it is.
 static const double sunk = 0.01, higher = 0.02, highest = 0.6, raised = 0.3;
 
+/// How much lower than hands that hang places are that the root stoops for, m.
+static const double stooped = 0.1;
+
 /// Part of the weight of what leads hands that keeps the root at its height.
 static const double lightly = 0.3;
 
@@ -176,6 +179,20 @@ static void find_sides(const hands *h, const cav_pose *body, double away, double
   }
 }
 
+/// The geom of the thing that comes farthest out along n: a handle, where it has one.
+static int outermost(const hands *h, const double n[3]) {
+  int best = -1;
+  double most = -INFINITY;
+  for (int g = 0; g < h->m->ngeom; g++) {
+    if (h->m->geom[g].link != h->thing.link || !(h->m->geom[g].contype || h->m->geom[g].conaffinity)) continue;
+    cav_pose pose;
+    cav_object_pose(h->m, h->state, CAV_OBJECT_GEOM, g, &pose);
+    const double out = dot3(pose.pos, n) + cav_geom_exit(h->m, g, &pose, n);
+    if (out > most + shallow) most = out, best = g;
+  }
+  return best;
+}
+
 /// Where they push it from, in the world: opposite to the way, side by side, where it does not tip.
 static void find_back(const hands *h, double away, double place[2][3]) {
   static const double up[3] = {0, 0, 1}, down[3] = {0, 0, -1};
@@ -185,21 +202,27 @@ static void find_back(const hands *h, double away, double place[2][3]) {
   set3(across, -n[1], n[0], 0); // to the right of who goes that way
   const double depth = cav_thing_surface(h->m, h->state, h->thing.link, n, centre, &lowest);
   const double edge = cav_thing_surface(h->m, h->state, h->thing.link, ahead, centre, &none);
-  const double width = cav_thing_surface(h->m, h->state, h->thing.link, across, centre, &none);
-  const double top = centre[2] + cav_thing_surface(h->m, h->state, h->thing.link, up, centre, &none);
-  double side[3];
+  const int g = outermost(h, n);
+  cav_pose back;
+  cav_object_pose(h->m, h->state, CAV_OBJECT_GEOM, g, &back);
+  const double width = cav_geom_exit(h->m, g, &back, across), bottom = cav_geom_bottom(h->m, g, &back),
+               top = back.pos[2] + cav_geom_exit(h->m, g, &back, up);
+  double side[3], off[3];
   sub3(side, h->at[1], h->at[0]);
-  const double apart = fmin(within_width * width, 0.5 * hypot(side[0], side[1]));
+  sub3(off, back.pos, centre);
+  const double apart = fmin(within_width * width, 0.5 * hypot(side[0], side[1])), aside = dot3(off, across);
   for (int k = 0; k < 2; k++) {
     cav_pose hand;
     cav_object_pose(h->m, h->state, CAV_OBJECT_GEOM, h->geom[k], &hand);
     axpy3(place[k], centre, depth + away * cav_geom_reach(h->m, h->geom[k], &hand, ahead), n);
-    axpy3(place[k], place[k], k ? -apart : apart, across);
+    axpy3(place[k], place[k], aside + (k ? -apart : apart), across);
     const double over = cav_geom_reach(h->m, h->geom[k], &hand, up),
                  under = cav_geom_reach(h->m, h->geom[k], &hand, down);
     const double tips = lowest + steady * edge / h->friction;
     const double high = h->thing.joint < 0 ? fmin(h->at[k][2], tips) : h->at[k][2];
-    place[k][2] = fmax(fmin(high, top - over), lowest + under);
+    // hands thicker than a rail take its middle
+    const int thin = top - over < bottom + under;
+    place[k][2] = thin ? back.pos[2] : fmax(fmin(high, top - over), bottom + under);
   }
 }
 
@@ -238,9 +261,10 @@ static void lay(const hands *h, const cav_pose *body, double place[2][3], cav_ca
   add3(c->there, pose.pos, h->thing.way);
   if (!hung) push_term(c, CAV_SENSOR_FRAMEZAXIS, kind, index, c->upright)->to = h->thing.time;
   push_term(c, CAV_SENSOR_FRAMEPOS, kind, index, c->still)->to = c->from;
-  // hands that go up would take the root along, where nothing weighs yet
+  // hands that go up would take the root along, where nothing weighs yet; it stoops for what is lower than hands that hang
   c->height[2] = h->root[2];
-  if (c->over > 0) {
+  const int stoops = fmin(place[0][2], place[1][2]) < fmin(h->at[0][2], h->at[1][2]) - stooped;
+  if (c->over > 0 && !stoops) {
     cav_term *level = push_term(c, CAV_SENSOR_FRAMEPOS, CAV_OBJECT_XBODY, m->joint[c->root].body, c->height);
     level->component = 2, level->weight *= lightly, level->to = h->thing.time;
   }

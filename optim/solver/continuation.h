@@ -84,8 +84,8 @@ cav_status cav_solve_after(const cav_problem *problem, const cav_solve_options *
 /// Whether rows are so near to holding that feedback may make a certified motion of it.
 int cav_run_certifiable(const cav_solve_run *run);
 
-/// Whether a certificate would refuse the motion by more than polish mends, into run->refused: where the options leave such ones,
-/// and its rows nearly hold. CAV_NO_MEMORY. solution.c.
+/// Whether a certificate would refuse the motion, or it misses a target by little, by more than polish mends, into run->refused:
+/// where the options leave such ones, and its rows nearly hold. CAV_NO_MEMORY. solution.c.
 cav_status cav_run_screen(cav_solve_run *run);
 
 /// Whether no set of gains, of a few, follows the motion that stands: into run->refused, where the options leave such ones, and

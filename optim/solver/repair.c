@@ -71,9 +71,15 @@ static const cure *cures_of(const cav_problem *p, const cav_verdict *v) {
                     fold[] = {SLIDING, STEP, NONE}, lost[] = {FORCE, STEP, SLACK}, with_force[] = {SLACK, FORCE, STEP},
                     target[] = {EFFORT, ANEW, GOALS}, close[] = {BIT, EFFORT, GOALS}, fades[] = {SMOOTHING, GAP, STEP},
                     near[] = {STEP, SLACK, NONE}, again[] = {STEP, SLIDING, NONE}, off_slip[] = {OFF, SMOOTHING, SLIP},
-                    off_hover[] = {OFF, GAP, SMOOTHING}, ground[] = {STEP, LOOSE, SOFTER}, none[] = {NONE};
-  if (v->certified)
-    return v->achieved ? none : v->missed_most > 0 && v->missed_most < CAV_MISSED_LITTLE ? close : target;
+                    off_hover[] = {OFF, GAP, SMOOTHING}, ground[] = {STEP, LOOSE, SOFTER}, none[] = {NONE},
+                    finer[] = {STEP, SMOOTHING, NONE}, lower[] = {SMOOTHING, STEP, GAP};
+  // what follows from its start is off by its steps, and hovers at rest by twelve of its smoothings and more
+  const int given = cav_problem_is_given(p);
+  const cure *aims = v->achieved                                                ? none
+                     : given                                                    ? finer
+                     : v->missed_most > 0 && v->missed_most < CAV_MISSED_LITTLE ? close
+                                                                                : target;
+  if (v->certified) return aims;
   if (!cav_verdict_feasible(v)) return cav_problem_has_record(p) ? ground : forces;
   if (v->penetration_max_m > CAV_TOLERANCE_PENETRATION) return deep;
   if (v->penetration_between_m > CAV_TOLERANCE_PENETRATION) return between;
@@ -87,9 +93,11 @@ static const cure *cures_of(const cav_problem *p, const cav_verdict *v) {
   int blurred = p->schedule.last.smoothing > cav_problem_default(p->model).schedule.last.smoothing;
   if (air > 1 && v->hover_self > 0.5) return limbs;
   if (air > 1 && !blurred && only_hangs(p)) return off_hover;
-  if (air > 1) return blurred ? fades : hover;
+  if (air > 1) return given ? lower : blurred ? fades : hover;
   if (v->replay_step_max_error > CAV_TOLERANCE_STEP) return cav_problem_has_record(p) ? again : fold;
   if (v->residual_fraction_max > v->residual_within) return none;
+  // left beside its targets, before gains were chosen
+  if (!v->achieved && !v->has_gains) return aims;
   // where forces cost something feedback has too little left, rather than standing on edges
   return cav_problem_has_record(p) ? near : is_stated(p, CAV_QUANTITY_FORCE) ? with_force : lost;
 }

@@ -107,10 +107,14 @@ static cav_status find_rows(cav_solve_run *run) {
 /// Times its tolerance from which on what a motion misses is not met by polish (METHOD.md, 7).
 static const double beyond_polish = 1.5;
 
-/// How many times its tolerance the worst of what a certificate asks without feedback is, 0 where that is not known; *achieves:
-/// whether all targets are met.
-static cav_status find_excess(const cav_solve_run *run, double *excess, int *achieves) {
-  cav_verdict v = {.achieved = 1};
+/// Times its tolerance from which on a target that is missed by little, so that a bit more of its weight is the cure, is not met
+/// by polish either.
+static const double beyond_target = 1.01;
+
+/// How many times its tolerance the worst of what a certificate asks without feedback is, 0 where that is not known; *missed: the
+/// same of targets, 0 where all are met.
+static cav_status find_excess(const cav_solve_run *run, double *excess, double *missed) {
+  cav_verdict v = {0};
   cav_error ignored = {0};
   const cav_options law = run->tr->options;
   const cav_status status = cav_verify_knots(run->problem, run->at, &law, &v, &ignored);
@@ -120,7 +124,7 @@ static cav_status find_excess(const cav_solve_run *run, double *excess, int *ach
                          v.penetration_between_m / CAV_TOLERANCE_PENETRATION};
   *excess = 0;
   for (size_t i = 0; i < sizeof over / sizeof *over && status == CAV_OK; i++) *excess = fmax(*excess, over[i]);
-  if (achieves) *achieves = status != CAV_OK || v.achieved;
+  if (missed) *missed = status == CAV_OK ? v.missed_most : 0;
   // what cannot be verified is told of at the end
   return status == CAV_NO_MEMORY ? status : CAV_OK;
 }
@@ -133,9 +137,9 @@ static int leaves(const cav_solve_run *run) {
 }
 
 cav_status cav_run_screen(cav_solve_run *run) {
-  double excess = 0;
-  const cav_status status = leaves(run) ? find_excess(run, &excess, NULL) : CAV_OK;
-  run->refused |= excess > beyond_polish;
+  double excess = 0, missed = 0;
+  const cav_status status = leaves(run) ? find_excess(run, &excess, &missed) : CAV_OK;
+  run->refused |= excess > beyond_polish || (missed > beyond_target && missed < CAV_MISSED_LITTLE);
   return status;
 }
 
@@ -145,17 +149,17 @@ enum { LAST_SETS = 8, STUCK_SETS = 16 };
 cav_status cav_run_screen_feedback(cav_solve_run *run) {
   cav_error ignored = {0};
   if (!leaves(run) || !cav_run_certifiable(run) || !cav_run_within_limits(run)) return CAV_OK;
-  int follows = 0, achieves = 1;
-  double excess = 0;
+  int follows = 0;
+  double excess = 0, missed = 0;
   run->phase = "feedback";
   run->stage = run->stages = 1;
   run->solution->contact = run->tr->options;
   run->solution->cost = cav_transcription_cost(run->tr);
   cav_status status = cav_choose_gains(run->problem, run->tr, run->at, STUCK_SETS, cav_run_feedback, run, run->solution,
                                        &follows, &ignored);
-  if (status == CAV_OK && follows) status = find_excess(run, &excess, &achieves);
+  if (status == CAV_OK && follows) status = find_excess(run, &excess, &missed);
   // its gains say where it is lost, or follow it beside what it was to reach; those of a motion that goes on are found at its end
-  run->refused = status == CAV_OK && run->solution->gain_q && !(follows && achieves);
+  run->refused = status == CAV_OK && run->solution->gain_q && !(follows && missed == 0);
   if (!run->refused) cav_gains_free(run->solution);
   return status == CAV_NO_MEMORY || status == CAV_INTERRUPTED ? status : CAV_OK;
 }

@@ -20,6 +20,7 @@
 #include "quantity.h"
 #include "reach.h"
 #include "sampling.h"
+#include "thing.h"
 #include "upright.h"
 
 _Static_assert((int)CAV_HAND_TERMS <= (int)CAV_CARRY_TERMS, "the room for terms that lead");
@@ -167,12 +168,12 @@ static void add_fine(const cav_problem *problem, cav_strategy *strategy, int *n)
 
 /// Where the guess runs into solids: by a flight where an arc is stated; over them, then as it is, then by a flight of its
 /// own; what they miss is mended before anything else is tried. A file without a guess is begun over them: the straight
-/// way through a solid is nobody's.
+/// way through a solid is nobody's. led: it is begun with hands led.
 static void add_grown(const cav_problem *problem, cav_strategy *strategy, int *n, const cav_strategy *grown,
-                      const cav_strategy *walk, const cav_strategy *fly) {
+                      const cav_strategy *walk, const cav_strategy *fly, int led) {
   cav_strategy step = over_solids(walk);
   if (fly->height > 0 && problem->guess_height > 0) add_mended(strategy, n, fly, "flight");
-  if (step.nswing && !is_decorated(problem) && problem->guess == CAV_GUESS_INTERPOLATE) {
+  if (step.nswing && !is_decorated(problem) && problem->guess == CAV_GUESS_INTERPOLATE && !led) {
     begin_with(strategy, &step);
   } else if (step.nswing) {
     add_mended(strategy, n, &step, "step");
@@ -208,6 +209,7 @@ typedef struct guesses {
   cav_strategy bypass;                   ///< round what it runs into, on the ground
   int collides, decorated, sinks;        ///< what the stated guess does, and is
   int pivots;                            ///< 1: it turns four feet or more on the spot, where they stand
+  int met;                               ///< 1: it is begun with what is moved staying until it is met
   int led;                               ///< 1: a file without a guess is begun with hands led
 } guesses;
 
@@ -342,6 +344,25 @@ static void add_sampled(const cav_problem *problem, cav_strategy *strategy, int 
   if (cav_sample_serves(problem)) add_mended(strategy, n, &sampled, number == 1 ? "sample" : "resample");
 }
 
+/// What is moved stays until a term brings something to it: straight to its goal it would be gone before that.
+static cav_status lie_until_met(const cav_problem *problem, const cav_strategy *stated, cav_strategy *strategy,
+                                guesses *g) {
+  const cav_model *m = problem->model;
+  if (g->decorated || g->collides || g->sinks || problem->guess != CAV_GUESS_INTERPOLATE) return CAV_OK;
+  cav_state *state = cav_state_new(m);
+  cav_thing thing = {.link = 0};
+  const cav_status status = state ? cav_thing_find(problem, 1, state, &thing) : CAV_NO_MEMORY;
+  cav_state_free(state);
+  const cav_link *link = &m->link[thing.link];
+  if (status || !thing.link || link->root != thing.link || link->njoint != 1 || !(thing.met > 0)) return status;
+  cav_strategy lies = *stated;
+  lies.stated = 0, lies.met = thing.met, lies.moved = link->joint;
+  lies.text = "with what has to move staying where it is until a term brings something to it";
+  begin_with(strategy, &lies);
+  g->met = 1;
+  return CAV_OK;
+}
+
 /// With hands brought first to what has to be pushed, carried or touched: both of what stands on a free base, or else one.
 /// A file without a guess whose terms bring no hands there is begun so.
 static cav_status add_pushed(const cav_problem *problem, cav_strategy *strategy, int *n, const cav_strategy *stated,
@@ -350,7 +371,8 @@ static cav_status add_pushed(const cav_problem *problem, cav_strategy *strategy,
   cav_carry carry;
   cav_strategy push = *stated;
   if (problem->cycle.on) return CAV_OK;
-  cav_status status = cav_carry_find(problem, 1, &carry);
+  cav_status status = lie_until_met(problem, stated, strategy, g);
+  if (!status) status = cav_carry_find(problem, 1, &carry);
   if (!status && !carry.found) status = cav_hand_find(problem, 1, &hand);
   if (status || (!carry.found && !hand.found)) return status;
   push.hand = carry.found ? 2 : 1;
@@ -368,7 +390,7 @@ static cav_status add_pushed(const cav_problem *problem, cav_strategy *strategy,
   const int hung = carry.hung || hand.hung;
   g->led = (carry.found || (hangs(problem->model) && !hand.touches)) && !hung && !g->decorated &&
            (!g->collides || carry.over > 0) && !g->sinks && problem->guess == CAV_GUESS_INTERPOLATE &&
-           !cav_upright_held(problem);
+           !cav_upright_held(problem) && !g->met;
   if (g->led)
     begin_with(strategy, &push);
   else
@@ -446,14 +468,15 @@ static void add_plain(const cav_problem *problem, cav_strategy *strategy, int *n
 /// From other guesses and by other schedules.
 static cav_status add_others(const cav_problem *problem, cav_strategy *strategy, int *n, const guesses *g) {
   // a file without a guess is begun so
-  if (g->detour.nswing) begin_with(strategy, &g->detour);
+  if (g->detour.nswing && !g->led) begin_with(strategy, &g->detour);
   const int round = g->bypass.bow[0] != 0 || g->bypass.bow[1] != 0;
   if (g->reach.nreach) begin_with(strategy, &g->reach);
-  if (g->collides) add_grown(problem, strategy, n, &g->stated, &g->walk, &g->fly);
+  if (g->collides) add_grown(problem, strategy, n, &g->stated, &g->walk, &g->fly, g->led);
   if (!g->collides && g->fly.height > 0 && problem->guess_height > 0) add_mended(strategy, n, &g->fly, "flight");
-  if (round) begin_with(strategy, &g->bypass);
-  if (g->pivots) begin_with(strategy, &g->walk);
-  if (g->walk.nswing && !g->collides && !g->pivots) add_mended(strategy, n, &g->walk, "swing");
+  if (round && !g->led) begin_with(strategy, &g->bypass);
+  const int pivots = g->pivots && !g->led;
+  if (pivots) begin_with(strategy, &g->walk);
+  if (g->walk.nswing && !g->collides && !pivots) add_mended(strategy, n, &g->walk, "swing");
   if (!g->collides) add_fine(problem, strategy, n);
   cav_strategy soft = g->stated;
   soft.schedule.first.smoothing *= SOFTER;
@@ -759,6 +782,28 @@ static cav_status solve_sampled(const cav_problem *taken, int number, const cav_
   return *solution && (!status || status == CAV_NOT_CONVERGED) ? kept : status;
 }
 
+/// From a guess in which what is moved stays as it is at the start until it is met.
+static cav_status solve_met(const cav_problem *taken, const cav_strategy *strategy, const cav_solve_options *options,
+                            cav_solution **solution, cav_error *error) {
+  const cav_model *m = taken->model;
+  const cav_joint *joint = &m->joint[strategy->moved];
+  const int size = joint->type == CAV_JOINT_FREE ? 7 : joint->type == CAV_JOINT_BALL ? 4 : 1;
+  cav_problem met = *taken;
+  cav_trajectory *at = cav_trajectory_new(m, (int)lround(taken->duration / taken->timestep) + 1, taken->timestep);
+  cav_status status = at ? cav_guess_fill(taken, taken->q_goal, at) : CAV_NO_MEMORY;
+  cav_guess_pose pose = {strategy->met, NULL};
+  *solution = NULL;
+  if (!status) {
+    double *q = at->q + (size_t)lround(strategy->met / taken->timestep) * (size_t)m->nq;
+    memcpy(q + joint->q, taken->q_start + joint->q, (size_t)size * sizeof *q);
+    pose.q = q;
+    met.guess_pose = &pose, met.nguess_pose = 1;
+    status = cav_solve(&met, options, NULL, solution, error);
+  }
+  cav_trajectory_free(at);
+  return status;
+}
+
 cav_status cav_strategy_solve(const cav_problem *problem, const cav_strategy *strategy,
                               const cav_solve_options *options, const cav_trajectory *start, cav_solution **solution,
                               cav_error *error) {
@@ -766,6 +811,7 @@ cav_status cav_strategy_solve(const cav_problem *problem, const cav_strategy *st
   cav_strategy_apply(problem, strategy, &taken);
   if (strategy->hand && !start) return solve_pushed(&taken, strategy->hand, options, solution, error);
   if (strategy->samples && !start) return solve_sampled(&taken, strategy->samples, options, solution, error);
+  if (strategy->met > 0 && !start) return solve_met(&taken, strategy, options, solution, error);
   if (strategy->nreach && !start) return solve_reached(&taken, strategy, options, solution, error);
   const cav_checkpoint *resume = options ? options->resume : NULL;
   int second = resume && resume->order == strategy->order;

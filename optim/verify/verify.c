@@ -326,6 +326,9 @@ static void decide(const cav_verification *verification, const metrics *found, c
              "A smaller tolerance of the solver usually helps.",
              replay->open_seconds, least);
   }
+  if (*replay->closed.lost && !*verdict->reason && !verdict->has_gains && *verdict->missed) {
+    snprintf(verdict->reason, sizeof verdict->reason, "left without gains beside a target: %s", verdict->missed);
+  }
   if (*replay->closed.lost && !*verdict->reason) {
     snprintf(verdict->reason, sizeof verdict->reason,
              "closed loop at a tenth of the step ends after %.3g of %.3g s: %s. "
@@ -410,8 +413,9 @@ static cav_status verify(const cav_problem *problem, const cav_trajectory *traje
   if (status == CAV_OK) {
     if (simulated) *verdict->reason = 0;
     fill(&verification, &found, &replay, verdict);
-    if (simulated) decide(&verification, &found, &replay, verdict);
+    verdict->has_gains = gain_q != NULL;
     cav_targets_verdict(&verification, report, found.residual.cost, verdict);
+    if (simulated) decide(&verification, &found, &replay, verdict);
     status = cav_verification_ending(&verification, verdict);
   }
   verdict->push_survived_n_s = NAN;

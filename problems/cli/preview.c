@@ -99,7 +99,8 @@ void cav_command_tell_guess(FILE *out, const cav_problem *p, int whole) {
 void cav_command_tell_begin(FILE *out, const char *indent, const cav_strategy *first) {
   if (!first->hand && first->stated) return;
   fprintf(out, "%s%s: begun %s\n", indent,
-          first->hand ? "the file has no <guess>, and no term of it brings a hand to what has to be moved"
+          first->hand      ? "the file has no <guess>, and no term of it brings a hand to what has to be moved"
+          : first->met > 0 ? "the file has no <guess>, and the straight way of what has to move leads off at once"
           : first->nreach
               ? "the file has no <goal>, and the straight way to what is asked for at the end runs into something"
               : "the straight way from start to goal runs into a solid or the ground, or turns feet where "

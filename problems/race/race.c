@@ -530,7 +530,7 @@ static int find_near(const cav_race *race, int i, const char *passed) {
 // whether two strategies are the same: of one guess with the same changes
 static int is_same(const cav_strategy *a, const cav_strategy *b) {
   return a->left == b->left && a->stated == b->stated && a->guess == b->guess && a->nswing == b->nswing &&
-         a->nreach == b->nreach && a->flies == b->flies && a->height == b->height && a->bow[0] == b->bow[0] &&
+         a->nreach == b->nreach && a->met == b->met && a->flies == b->flies && a->height == b->height && a->bow[0] == b->bow[0] &&
          a->bow[1] == b->bow[1] && !strcmp(a->changed, b->changed);
 }
 
@@ -620,8 +620,9 @@ static void settle(cav_race *race, int i) {
   if (goes_on) e->from = of;
   e->mends = of, e->cure = cure;
   e->strategy = repaired;
-  // what is all but certified is not sought anew
-  e->goes_on = goes_on && cav_rank_rough(&race->entry[of].report.verdict);
+  // what is all but certified is not sought anew; what is so but for a target goes straight to its optimum
+  const cav_verdict *v = &race->entry[of].report.verdict;
+  e->goes_on = goes_on && cav_rank_rough(v) && !cav_rank_beside(v);
   if (race->tell) fprintf(stderr, "strategy %-8s with %s\n", e->strategy.name, e->strategy.changed);
 }
 

@@ -89,18 +89,36 @@ int cav_rank_rough(const cav_verdict *v) {
          v->slip_mean_m_s <= several * CAV_TOLERANCE_SLIP && v->hover_fraction <= several * CAV_TOLERANCE_HOVER;
 }
 
+// the largest ratio of a figure to its tolerance; *which: 0 of the balance of momentum, 1 slip, 2 hover
+static double over_tolerance(const cav_verdict *v, int *which) {
+  const double over[] = {v->momentum_defect_rms / CAV_TOLERANCE_MOMENTUM, v->slip_mean_m_s / CAV_TOLERANCE_SLIP,
+                         v->hover_fraction / CAV_TOLERANCE_HOVER};
+  *which = 0;
+  for (int k = 1; k < 3; k++)
+    if (over[k] > over[*which]) *which = k;
+  return over[*which];
+}
+
+int cav_rank_beside(const cav_verdict *v) {
+  int which;
+  return cav_rank_rough(v) && v->nmissed > 0 && !v->has_gains && depth_of(v) <= 1 && over_tolerance(v, &which) <= 1 &&
+         v->replay_step_max_error <= CAV_TOLERANCE_STEP;
+}
+
 int cav_rank_close(const cav_race_report *report) {
-  return report->verdict.certified && misses_little(&report->verdict);
+  const cav_verdict *v = &report->verdict;
+  return (v->certified || cav_rank_beside(v)) && misses_little(v);
 }
 
 int cav_rank_far(const cav_race_report *report) {
-  return report->verdict.certified && report->verdict.missed_most > far;
+  const cav_verdict *v = &report->verdict;
+  return (v->certified || cav_rank_beside(v)) && v->missed_most > far;
 }
 
 int cav_rank_near(const cav_race_report *report, double effort) {
   const cav_verdict *v = &report->verdict;
   if (!report->solution || report->status == CAV_INTERRUPTED) return 0;
-  if (v->certified) return !v->achieved && (2 * v->nmissed < v->ntarget || misses_little(v));
+  if (v->certified || cav_rank_beside(v)) return !v->achieved && (2 * v->nmissed < v->ntarget || misses_little(v));
   // a motion that does something else is not what is looked for
   if (2 * v->nmissed > v->ntarget) return 0;
   if (cav_rank_rough(v)) return 1;
@@ -113,25 +131,15 @@ int cav_rank_near(const cav_race_report *report, double effort) {
 // beyond its tolerance, since another law of contacts mends it
 static const double folded = 1.1;
 
-// the largest ratio of a figure to its tolerance; *which: 0 of the balance of momentum, 1 slip, 2 hover
-static double over_tolerance(const cav_verdict *v, int *which) {
-  const double over[] = {v->momentum_defect_rms / CAV_TOLERANCE_MOMENTUM, v->slip_mean_m_s / CAV_TOLERANCE_SLIP,
-                         v->hover_fraction / CAV_TOLERANCE_HOVER};
-  *which = 0;
-  for (int k = 1; k < 3; k++)
-    if (over[k] > over[*which]) *which = k;
-  return over[*which];
-}
-
 // times of its tolerance that a possible motion has of what it keeps least of a certificate; of a closed loop that is lost,
 // the duration over the time until then
 static double excess_of(const cav_verdict *v) {
   int which;
   double most = fmax(over_tolerance(v, &which), depth_of(v));
   if (v->replay_step_max_error > CAV_TOLERANCE_STEP) most = fmax(most, folded);
-  double followed = fmin(v->closed_loop_seconds, v->model_contacts_seconds);
   // one without gains was left before they were chosen
-  if (!(followed > 0)) return most;
+  if (!v->has_gains) return most;
+  const double followed = fmin(v->closed_loop_seconds, v->model_contacts_seconds);
   return fmax(most, v->duration / fmax(followed, v->duration / 100));
 }
 

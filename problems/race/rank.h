@@ -21,6 +21,9 @@ int cav_rank_keeps(const cav_verdict *verdict);
 /// planned.
 int cav_rank_rough(const cav_verdict *verdict);
 
+/// Whether a motion was left without gains, since it misses a target, and keeps all else that a certificate asks of its knots.
+int cav_rank_beside(const cav_verdict *verdict);
+
 /// Whether a motion is nearly what was asked; effort is the fraction of the actuators that was planned with.
 int cav_rank_near(const cav_race_report *report, double effort);
 
