@@ -599,7 +599,8 @@ static cav_schedule resumed(const cav_schedule *schedule) {
   return rest;
 }
 
-/// Fraction of the cost that a step may still save where both hands have led: terms that are no part of the problem are in it.
+/// Fraction of the cost that a step may still save where both hands have led, since terms that are no part of the problem are in
+/// it, and at the end of another order, from where a solve begins by softer laws.
 static const double leads_to = 0.05;
 
 /// What leads a guess: terms that are no part of the problem, and what the guess passes.
@@ -826,8 +827,11 @@ cav_status cav_strategy_solve(const cav_problem *problem, const cav_strategy *st
   cav_solution *before = NULL;
   first.diagnose = first.gains = 0;
   rest.resume = NULL;
+  const double optimality = taken.schedule.optimality;
   taken.order = CAV_ORDER_MIDPOINT;
+  taken.schedule.optimality = leads_to;
   cav_status status = cav_solve(&taken, &first, NULL, &before, error);
+  taken.schedule.optimality = optimality;
   // one that was stopped, or has no motion, ends here
   if (!before || (status != CAV_OK && status != CAV_NOT_CONVERGED)) {
     *solution = before;
