@@ -234,7 +234,7 @@ static double depth_in_table(const cav_problem *p, double aside) {
 /// on a table.
 static void test_from_floor(void) {
   for (int high = 0; high < 2; high++) {
-    cav_problem *p = load(high ? "../unseen/box-to-shelf" : "../unseen/box-to-table");
+    cav_problem *p = load(high ? "../unseen/box-to-shelf" : "../../problems/examples/box-to-table");
     if (!p) continue;
     cav_strategy strategy[CAV_STRATEGIES];
     cav_carry c;
@@ -250,7 +250,7 @@ static void test_from_floor(void) {
 /// A ball to which a term brings a foot lies until then, and no hand is led to it; where the foot is asked for elsewhere one is.
 static void test_met(void) {
   for (int away = 0; away < 2; away++) {
-    cav_problem *p = load("kick");
+    cav_problem *p = load("../../problems/examples/kick");
     if (!p) continue;
     cav_strategy strategy[CAV_STRATEGIES];
     double target[3] = {0.05, -0.085, 0.1};

@@ -1,5 +1,5 @@
 #!/bin/sh
-# Solves the problems of tests/unseen, each stated in minutes and not tuned, as anyone would, and writes results/unseen.md: whether it is
+# Solves the problems of tests/unseen and problems/examples, each stated in minutes and not tuned, as anyone would, and writes results/unseen.md: whether it is
 # certified and achieved, by which strategy, what all of them took, one thread each, and from how many of eight starts that are a
 # little off MuJoCo follows it (build/tests/bench_replay, where that was built). Problems whose models are not there are left out.
 # Each is stopped after $SECONDS_EACH s, by default 300.
@@ -11,7 +11,7 @@ build=${1:-build}
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 all=
-[ $# -gt 0 ] || { all=1; for f in tests/unseen/*.xml; do set -- "$@" "$(basename "$f" .xml)"; done; }
+[ $# -gt 0 ] || { all=1; for f in tests/unseen/*.xml problems/examples/*.xml; do set -- "$@" "$(basename "$f" .xml)"; done; }
 
 # field NAME: of the last verdict
 field() { sed -n "s/^ *\"$1\": \([^,]*\),*$/\1/p" "$work/$name/verdict.json"; }
@@ -24,9 +24,10 @@ follows() {
 }
 
 row() {
-  name=$1
-  [ -f "tests/unseen/$(sed -n 's/^<problem .*model="\([^"]*\)".*/\1/p' "tests/unseen/$name.xml")" ] || return 0
-  timeout -s INT "${SECONDS_EACH:-300}" "$build/problems/cavort" solve "tests/unseen/$name.xml" -o "$work/$name" --threads 1 --quiet >"$work/log" 2>&1 || true
+  name=$1 folder=tests/unseen
+  [ -f "$folder/$name.xml" ] || folder=problems/examples
+  [ -f "$folder/$(sed -n 's/^<problem .*model="\([^"]*\)".*/\1/p' "$folder/$name.xml")" ] || return 0
+  timeout -s INT "${SECONDS_EACH:-300}" "$build/problems/cavort" solve "$folder/$name.xml" -o "$work/$name" --threads 1 --quiet >"$work/log" 2>&1 || true
   [ -f "$work/$name/verdict.json" ] || { echo "| $name | no result: $(tail -1 "$work/log") |"; return; }
   kept=$(awk -F , 'NR > 1 && $2 == 1 { print $1 }' "$work/$name/strategies.csv")
   spent=$(awk -F , 'NR > 1 && $6 != "" { s += $6; n++ } END { printf "%d | %.0f", n, s }' "$work/$name/strategies.csv")
@@ -42,7 +43,7 @@ table() {
 
 if [ "$all" ]; then
   {
-    printf '# Problems that were not tuned\n\n`sh tests/unseen.sh`: the files of tests/unseen, each stated in minutes, start and goal and what is asked; solved by all strategies, one thread, stopped after 300 s. Debian'\''s MuJoCo cannot read Go1'\''s file.\n\n'
+    printf '# Problems that were not tuned\n\n`sh tests/unseen.sh`: the files of tests/unseen and problems/examples, each stated in minutes, start and goal and what is asked; solved by all strategies, one thread, stopped after 300 s. Debian'\''s MuJoCo cannot read Go1'\''s file.\n\n'
     printf -- '- machine: %s\n- commit: %s\n\n' "$(sed -n 's/^model name[^:]*: //p' /proc/cpuinfo | head -1)" "$(git rev-parse --short HEAD)"
     table "$@"
   } >"$work/unseen.md"

@@ -2,7 +2,8 @@
 /// on, and who asked for a way over it is told. And whether a motion whose guess flies does not: who asked for a height alone
 /// may get one that rears up to it. And whether a body that is asked up at a time is up on its toes, what links of one body
 /// lean on each other, whether anything holds at the end what is to be at rest then, which parts besides those that it begins
-/// and ends on bear on the ground, and whether what is asked down to the ground stays above it.
+/// and ends on bear on the ground, whether what is asked down to the ground stays above it, and what moves a thing if no hand
+/// does.
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -11,6 +12,7 @@
 #include "cavort/result.h"
 #include "command.h"
 #include "role.h"
+#include "thing.h"
 
 // part of the weight from which on a solid counts as leaned on, and most solids that are named
 static const double leaning = 0.05;
@@ -388,6 +390,9 @@ static void tell_blows(FILE *out, const cav_problem *problem, const cav_forces *
   free(of);
 }
 
+// N from which on a force on what has to move counts
+static const double touched = 1;
+
 // m/s that the last step may take away at an end at rest without that being told
 static const double braking = 0.1;
 
@@ -433,6 +438,37 @@ static void tell_ending(FILE *out, const cav_problem *problem, const cav_forces 
   }
 }
 
+/// What has to move and who has hands moves by something else, as a trolley by the belly; that a term brings there is meant.
+static void tell_handless(FILE *out, const cav_problem *problem, const cav_forces *forces, double timestep) {
+  const cav_model *m = problem->model;
+  cav_state *state = cav_state_new(m);
+  cav_thing thing = {.link = 0};
+  cav_roles roles = {0};
+  cav_status status = state ? cav_thing_find(problem, 1, state, &thing) : CAV_NO_MEMORY;
+  if (!status) status = cav_roles_find(m, state, &roles);
+  cav_state_free(state);
+  const int right = roles.body[CAV_ROLE_RIGHT_HAND], left = roles.body[CAV_ROLE_LEFT_HAND];
+  if (status || !thing.link || thing.met > 0 || right <= 0 || left <= 0) return;
+  const cav_contact_force *most = NULL;
+  int hands = 0, mover = 0;
+  for (int i = 0; i < forces->nforce; i++) {
+    const cav_contact_force *f = &forces->force[i];
+    const int swapped = m->geom[f->geom2].link == thing.link, other = swapped ? f->geom1 : f->geom2;
+    if (!swapped && m->geom[f->geom1].link != thing.link) continue;
+    const int body = m->geom[other].body, link = m->geom[other].link;
+    if (link <= 0 || !m->link[link].driven || size_of(f) < touched) continue;
+    hands |= body == right || body == left;
+    if (!is_asked(problem, link) && (!most || size_of(f) > size_of(most))) most = f, mover = body;
+  }
+  if (hands || !most) return;
+  const char *name = or_else(m->body[m->link[thing.link].body].name, "what has to move");
+  fprintf(out,
+          "  note: '%.60s' moves '%.60s', with up to %.3g N at %.3g s, and no hand touches it; a framepos of \"right "
+          "hand\" and one "
+          "of \"left hand\" in its frame (reftype, refname), over the time of the way, have hands move it\n",
+          or_else(m->body[mover].name, "a body"), name, size_of(most), most->knot * timestep);
+}
+
 void cav_command_tell_leaning(FILE *out, const cav_problem *problem, const cav_trajectory *motion,
                               const cav_options *contact) {
   const cav_model *m = problem->model;
@@ -465,6 +501,7 @@ void cav_command_tell_leaning(FILE *out, const cav_problem *problem, const cav_t
         "a time make it leave the ground\n");
   if (forces) tell_toes(out, problem, motion, forces, weight), tell_ground(out, problem, motion, forces, weight);
   if (forces) tell_hovering(out, problem, motion, forces, weight), tell_blows(out, problem, forces, motion->timestep);
+  if (forces) tell_handless(out, problem, forces, motion->timestep);
   cav_forces_free(forces);
   free(most), free(with);
 }
