@@ -231,10 +231,11 @@ static const struct {
      "what no actuator moves stands in <scene> as a <body> with a <freejoint>, or with a <joint> of type hinge or "
      "slide;\n"
      "  it is wanted by its place, <sensor type=\"framepos\" body=\"box\" .../>, or its joint,\n"
-     "  <sensor type=\"jointpos\" joint=\"door\" .../>, and hands are brought to it. What nothing stops at the end:\n"
-     "  <horizon close=\"open\"/>",
+     "  <sensor type=\"jointpos\" joint=\"door\" .../>, and hands are brought to it, unless a term\n"
+     "  brings something else, as a foot to a ball. They lead the guess: where another part moves it after all solve "
+     "says so.\n  What nothing stops at the end: <horizon close=\"open\"/>",
      "jointpos"},
-    {"stairs|stair|ladder|ledge|podium|hurdle|over|vault",
+    {"stairs|stair|ladder|beam|ledge|podium|hurdle|over|vault",
      "what is stepped on or over stands in <scene>; the goal's posture stands on it with height=\"floor\" and rise= "
      "the height "
      "of\n"
@@ -267,7 +268,15 @@ static const struct {
      "themselves;\n"
      "  one hand or a gripper is not: help grasp",
      "framepos"},
-    {"jump|hop|walk|kick|climb|crawl|roll|pushup|push-up|backflip|cartwheel|handstand|dance|motions|examples",
+    {"strategy|strategies|near-1|repair-1|soft|fine|solids|midpoint|resample|detour",
+     "where the stated guess leads to no certificate, or beside what was asked, solve tries others: guesses and "
+     "schedules\n"
+     "  by names, in an order that cavort inspect FILE lists, each in words. near-1, near-2 ... mend what is nearly "
+     "there and\n"
+     "  repair-1 ... the best one at last, by the usual cure of what it misses. strategies.csv of a result says what "
+     "became\n  of each; --strategies 1 tries none, --strategies 2 two at once",
+     "solve"},
+    {"jump|jumping|hop|walk|kick|climb|crawl|roll|pushup|push-up|backflip|cartwheel|handstand|dance|motions|examples",
      "motions of the project stand in problems/motions; cavort new MODEL --like jump writes one for a model", "new"},
     {"output|folder|csv|trajectory|json|files",
      "cavort solve writes a folder, NAME.result; its files: problems/README.md, Result folders", "solve"},
