@@ -284,7 +284,7 @@ static void test_warm(cav_problem *p) {
 static void test_refusals(const cav_problem *p, const char *folder) {
   static const struct {
     const char *from, *to;
-  } broken[] = {{"cavort_checkpoint,2", "cavort_checkpoint,1"},
+  } broken[] = {{"cavort_checkpoint,3", "cavort_checkpoint,2"},
                 {"place,continuation", "place,nowhere"},
                 {"order,", "ordre,"},
                 {"nq,1", "nq,2"},

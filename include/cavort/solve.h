@@ -112,6 +112,7 @@ typedef struct cav_checkpoint {
   cav_status status;              ///< of the solve, at CAV_PLACE_FEEDBACK
   double optimality;              ///< as in cav_solution, NaN: not measured
   cav_trajectory *trajectory;     ///< of the trees that are planned: the dofs of others are not in it
+  cav_trajectory *stood;          ///< where the last stage whose rows were nearly in has led; NULL: none was
   int nmultiplier;                ///< number of rows
   double *multiplier;             ///< [nmultiplier] of the augmented Lagrangian, row by row as in cav_solution
   double *final_multiplier;       ///< [nmultiplier] of the programme

@@ -1,8 +1,9 @@
 /// Checkpoints: what a solve was about to do, its trajectory and its multipliers, told between two parts and taken up
 /// again. Between parts nothing else is carried on: models of the cost and of its curvature are found anew in each.
 ///
-/// The file has one record a line, commas between its fields: "cavort_checkpoint,2", one line for each scalar, its
-/// name first; q and v of every knot, "q,KNOT,..."; multipliers of every knot; "end". Numbers have 17 digits, which
+/// The file has one record a line, commas between its fields: "cavort_checkpoint,3", one line for each scalar, its
+/// name first; q and v of every knot, "q,KNOT,..."; the same of the motion to go back to, where there is one; multipliers of
+/// every knot; "end". Numbers have 17 digits, which
 /// bring every bit back.
 #include <assert.h>
 #include <limits.h>
@@ -64,13 +65,14 @@ static cav_status tell(cav_solve_run *run) {
   c->seconds = cav_clock() - run->start;
   c->optimality = run->measured ? run->optimality : NAN;
   c->trajectory = run->at;
+  c->stood = run->stood;
   c->multiplier = cav_run_multipliers(run, 0, &c->nmultiplier);
   c->final_multiplier = cav_run_multipliers(run, 1, &c->nmultiplier);
   cav_status status = c->multiplier && c->final_multiplier ? CAV_OK : CAV_NO_MEMORY;
   if (status == CAV_OK && run->options->keeper(run->options->keeper_context, c)) status = CAV_INTERRUPTED;
   free(c->multiplier), free(c->final_multiplier);
   c->multiplier = c->final_multiplier = NULL;
-  c->trajectory = NULL;
+  c->trajectory = c->stood = NULL;
   return status;
 }
 
@@ -118,6 +120,8 @@ cav_status cav_run_resume(cav_solve_run *run, cav_error *error) {
   memcpy(run->at->q, at->q, (size_t)at->nknot * (size_t)at->nq * sizeof(double));
   memcpy(run->at->v, at->v, (size_t)at->nknot * (size_t)at->nv * sizeof(double));
   run->at->timestep = at->timestep;
+  run->stood = c->stood ? cav_trajectory_copy(c->stood) : NULL;
+  if (c->stood && !run->stood) return CAV_NO_MEMORY;
   give_multipliers(run->tr, c->multiplier, c->final_multiplier);
   run->resume = c;
   run->region.radius = c->radius;
@@ -144,6 +148,13 @@ static void write_row(FILE *out, const char *name, int knot, size_t n, const dou
   fputc('\n', out);
 }
 
+static void write_motion(FILE *out, const cav_trajectory *at) {
+  for (int t = 0; t < at->nknot; t++) {
+    write_row(out, "q", t, (size_t)at->nq, at->q + (size_t)t * (size_t)at->nq);
+    write_row(out, "v", t, (size_t)at->nv, at->v + (size_t)t * (size_t)at->nv);
+  }
+}
+
 /// Scalars in the order in which they stand.
 #define SCALARS(X) \
   X(stage)         \
@@ -159,17 +170,16 @@ cav_status cav_checkpoint_write(const char *path, const cav_checkpoint *c, cav_e
   FILE *out = file.stream;
   assert(!strpbrk(c->key, ",\n"));
   assert(c->place < CAV_PLACE_TYPES && (unsigned)c->order < ORDERS);
-  fprintf(out, "cavort_checkpoint,2\nkey,%s\nplace,%s\norder,%s\n", c->key, place_words[c->place],
+  fprintf(out, "cavort_checkpoint,3\nkey,%s\nplace,%s\norder,%s\n", c->key, place_words[c->place],
           order_words[c->order]);
 #define WRITE(field) fprintf(out, #field ",%.17g\n", (double)c->field);
   SCALARS(WRITE)
 #undef WRITE
   fprintf(out, "nq,%d\nnv,%d\nknots,%d\ntimestep,%.17g\nmultipliers,%d\n", at->nq, at->nv, at->nknot, at->timestep,
           c->nmultiplier);
-  for (int t = 0; t < at->nknot; t++) {
-    write_row(out, "q", t, (size_t)at->nq, at->q + (size_t)t * (size_t)at->nq);
-    write_row(out, "v", t, (size_t)at->nv, at->v + (size_t)t * (size_t)at->nv);
-  }
+  write_motion(out, at);
+  fprintf(out, "stood,%.17g\n", c->stood ? c->stood->timestep : 0);
+  if (c->stood) write_motion(out, c->stood);
   write_row(out, "multiplier", 0, (size_t)c->nmultiplier, c->multiplier);
   write_row(out, "final_multiplier", 0, (size_t)c->nmultiplier, c->final_multiplier);
   fputs("end\n", out);
@@ -245,7 +255,7 @@ static void row(reader *r, const char *expected, int knot, size_t n, double *val
 
 static void scalars(reader *r, cav_checkpoint *c) {
   name(r, "cavort_checkpoint");
-  if (whole(r, 2, 2) != 2) return;
+  if (whole(r, 3, 3) != 3) return;
   name(r, "key");
   snprintf(c->key, sizeof c->key, "%s", field(r, 0));
   name(r, "place");
@@ -271,6 +281,18 @@ static void scalars(reader *r, cav_checkpoint *c) {
     fail(r, "fractions from 0 to 1, a radius, steps and seconds");
 }
 
+// q and v of every knot of a new trajectory; of a plan that leaves out trees there are fewer than the model's
+static cav_trajectory *motion(reader *r, const cav_model *model, const int size[3], double timestep) {
+  cav_trajectory *at = cav_trajectory_new(model, size[2], timestep);
+  if (at) at->nq = size[0], at->nv = size[1];
+  if (!at) r->status = cav_file_fail(r->error, CAV_NO_MEMORY, r->line, "%s: no memory", r->path);
+  for (int t = 0; at && t < size[2]; t++) {
+    row(r, "q", t, (size_t)size[0], at->q + (size_t)t * (size_t)size[0]);
+    row(r, "v", t, (size_t)size[1], at->v + (size_t)t * (size_t)size[1]);
+  }
+  return at;
+}
+
 static void arrays(reader *r, const cav_model *model, cav_checkpoint *c) {
   name(r, "nq");
   int nq = whole(r, 0, INT_MAX);
@@ -289,20 +311,19 @@ static void arrays(reader *r, const cav_model *model, cav_checkpoint *c) {
   if (r->status == CAV_OK && ((size_t)knots * (size_t)(nq + nv) > numbers || 2 * (size_t)c->nmultiplier > numbers))
     fail(r, "all of its numbers");
   if (r->status != CAV_OK) return;
-  // of a plan that leaves out trees: fewer than the model's
-  cav_trajectory *at = cav_trajectory_new(model, knots, timestep);
-  if (at) at->nq = nq, at->nv = nv;
-  c->trajectory = at;
+  const int size[3] = {nq, nv, knots};
+  c->trajectory = motion(r, model, size, timestep);
+  name(r, "stood");
+  const double stood = number(r);
+  if (r->status == CAV_OK && !(stood >= 0 && isfinite(stood))) fail(r, "a timestep, or 0");
+  if (r->status == CAV_OK && stood > 0 && (size_t)knots * (size_t)(nq + nv) > strlen(r->at) / 2)
+    fail(r, "all of its numbers");
+  if (r->status == CAV_OK && stood > 0) c->stood = motion(r, model, size, stood);
   c->multiplier = malloc(((size_t)c->nmultiplier + 1) * sizeof(double));
   c->final_multiplier = malloc(((size_t)c->nmultiplier + 1) * sizeof(double));
-  if (!c->trajectory || !c->multiplier || !c->final_multiplier) {
+  if (r->status == CAV_OK && (!c->multiplier || !c->final_multiplier))
     r->status = cav_file_fail(r->error, CAV_NO_MEMORY, r->line, "%s: no memory", r->path);
-    return;
-  }
-  for (int t = 0; t < knots; t++) {
-    row(r, "q", t, (size_t)nq, c->trajectory->q + (size_t)t * (size_t)nq);
-    row(r, "v", t, (size_t)nv, c->trajectory->v + (size_t)t * (size_t)nv);
-  }
+  if (r->status != CAV_OK) return;
   row(r, "multiplier", 0, (size_t)c->nmultiplier, c->multiplier);
   row(r, "final_multiplier", 0, (size_t)c->nmultiplier, c->final_multiplier);
   name(r, "end");
@@ -348,6 +369,7 @@ cav_checkpoint *cav_checkpoint_read(const char *path, const cav_model *model, ca
 void cav_checkpoint_free(cav_checkpoint *c) {
   if (!c) return;
   cav_trajectory_free(c->trajectory);
+  cav_trajectory_free(c->stood);
   free(c->multiplier), free(c->final_multiplier);
   free(c);
 }

@@ -31,6 +31,9 @@ static const double hopeless = 2;
 enum { RETRIES = 3 };
 static const double stands = 0.03;
 
+/// Rows of a stage that are in, but for so much.
+static const double rows_in = 2e-3;
+
 /// Restoration: iterations of each of its two attempts.
 enum { RESTORATIONS = 30 };
 
@@ -196,6 +199,8 @@ cav_status cav_kinematics_run(cav_solve_run *run) {
   int begin = run->solution->iterations;
   run->phase = "kinematics";
   // begun again: what was done is no part of it
+  cav_trajectory_free(run->stood);
+  run->stood = NULL;
   run->last.fraction = 0;
   run->stage = 1;
   run->stages = run->problem->schedule.stages;
@@ -245,6 +250,8 @@ cav_status cav_continuation_run(cav_solve_run *run) {
         outcome == CAV_OUTCOME_STALLED && retries < RETRIES && fraction > settled && fraction < 1 && !stage_stands(run);
     if (again) outcome = CAV_OUTCOME_AGAIN;
     if (!cav_run_note(run, fraction, begin, outcome)) status = CAV_NO_MEMORY;
+    const int stands_here = status == CAV_OK && !again && fraction >= 0.5 && cav_run_rows_off(run) < rows_in;
+    if (stands_here && !keep(&run->stood, run->at)) status = CAV_NO_MEMORY;
     if (outcome == CAV_OUTCOME_AGAIN || outcome == CAV_OUTCOME_STALLED) run->region.radius = 0;
     if (status != CAV_OK || (!again && run->stage == stages && fraction >= 1)) break;
     if (!again && is_hopeless(run, fraction, outcome)) {

@@ -18,6 +18,7 @@ typedef struct cav_solve_run {
   cav_solution *solution;
   const char *phase;
   int stage, stages;
+  cav_trajectory *stood;        ///< where the last stage whose rows were nearly in has led; NULL: none was
   cav_begin begin_with;         ///< what the first stage began with
   int warm;                     ///< the rows' final multipliers are those to start from
   int checks_raises;            ///< penalties that grow for nothing are taken back, as near a record

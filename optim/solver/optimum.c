@@ -10,6 +10,9 @@ enum { ITERATIONS = 250 };
 static const double softer[] = {0.6, 0.8};
 enum { SOFTENINGS = sizeof softer / sizeof *softer };
 
+/// Rows farther off than that after the last stage are lost.
+static const double rows_lost = 0.02;
+
 /// Through the law at a fraction of the way, to its optimum nearly, and all stages after it.
 static cav_status soften(cav_solve_run *run, double law, int *left) {
   int stages = run->problem->schedule.stages, first = 0;
@@ -50,12 +53,38 @@ static cav_status try_softer(cav_solve_run *run, double law, int *left, int *stu
   return status;
 }
 
+/// Where the last stages have lost rows that were in, from there by way of softer laws, the first whose stages keep them; where none
+/// does, from the end of these stages after all.
+static cav_status go_round(cav_solve_run *run, int *left) {
+  if (!run->stood) return CAV_OK;
+  cav_status status = cav_transcription_values(run->tr, run->at);
+  if (status != CAV_OK || cav_run_rows_off(run) <= rows_lost) return status;
+  cav_trajectory *end = run->at;
+  for (int i = 0; i < SOFTENINGS && status == CAV_OK; i++) {
+    run->at = cav_trajectory_copy(run->stood);
+    if (!run->at) {
+      run->at = end;
+      return CAV_NO_MEMORY;
+    }
+    status = soften(run, softer[i], left);
+    if (status == CAV_OK) status = cav_transcription_values(run->tr, run->at);
+    if (status != CAV_OK || cav_run_rows_off(run) <= rows_lost) {
+      cav_trajectory_free(end);
+      return status;
+    }
+    cav_trajectory_free(run->at);
+  }
+  run->at = end;
+  return cav_transcription_values(run->tr, run->at);
+}
+
 /// The last phase, and where its steps are stuck once more by way of softer laws, unless it is all that there is. What is
 /// still stuck then goes on as it can, and where softer laws gained nothing their iterations do not count.
 static cav_status descend(cav_solve_run *run) {
   int left = ITERATIONS, stuck = 0, stages = run->problem->schedule.stages,
       alone = stages < 2 || run->options->first_stage > stages;
-  cav_status status = cav_sqp(run, &left, alone ? NULL : &stuck);
+  cav_status status = alone ? CAV_OK : go_round(run, &left);
+  if (status == CAV_OK) status = cav_sqp(run, &left, alone ? NULL : &stuck);
   if (status == CAV_OK && stuck && !run->refused) status = cav_run_screen(run);
   if (status == CAV_OK && stuck && !run->refused) status = cav_run_screen_feedback(run);
   if (run->refused) return status;

@@ -303,6 +303,7 @@ cav_status cav_run_open(cav_solve_run *run, const cav_problem *problem, const ca
 void cav_run_close(cav_solve_run *run) {
   cav_trajectory_free(run->at);
   cav_trajectory_free(run->spare);
+  cav_trajectory_free(run->stood);
   cav_solution_free(run->solution);
   cav_normal_free(run->normal);
   cav_transcription_free(run->tr);
