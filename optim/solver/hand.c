@@ -18,8 +18,8 @@
 /// m: gap over the ground of what pushes.
 static const double clear = 0.005;
 
-/// The fraction of the time until the target from which on a hand pushes.
-static const double begins = 0.3;
+/// Fractions of the time until the target from which on a hand pushes, and until when, where it is wanted elsewhere at the end.
+static const double begins = 0.3, leaves_at = 0.7;
 
 /// Fraction of the schedule's way where contacts are sharp, and stages from there.
 static const double sharp = 0.87;
@@ -86,7 +86,28 @@ static void find_place(const cav_model *m, const cav_state *state, const cav_thi
   rotate_back(place, body.rotation, far);
 }
 
-static void lay(const cav_model *m, const cav_state *state, const cav_thing *t, int geom, double away, cav_hand *hand) {
+/// Whether a link is wanted elsewhere than at the thing at the end: by its place, or that of what hangs on the world as it does, or
+/// by its joints.
+static int is_wanted_back(const cav_problem *p, int link) {
+  const cav_model *m = p->model;
+  const cav_link *root = &m->link[m->link[link].root];
+  const int hangs = root->njoint == 0 || m->joint[root->joint].type != CAV_JOINT_FREE;
+  int wanted = 0;
+  for (int i = 0; i < p->nterm && !wanted; i++) {
+    const cav_term *term = &p->term[i];
+    const int last = (term->to < 0 || term->to >= p->duration) && term->from > 0 && cav_term_asks(term);
+    const int of = cav_term_placed(m, term);
+    const int placed = of == link || (of > 0 && hangs && m->link[of].root == m->link[link].root);
+    const int joints =
+        term->quantity == CAV_QUANTITY_CONFIGURATION && (term->dofs == CAV_DOFS_ALL || term->dofs == CAV_DOFS_JOINTS);
+    wanted = last && (placed || joints);
+  }
+  return wanted;
+}
+
+static void lay(const cav_problem *p, const cav_state *state, const cav_thing *t, int geom, double away,
+                cav_hand *hand) {
+  const cav_model *m = p->model;
   const int body = m->link[t->link].body;
   cav_pose pose;
   find_place(m, state, t, geom, away, hand->place);
@@ -98,17 +119,21 @@ static void lay(const cav_model *m, const cav_state *state, const cav_thing *t, 
   hand->term[0].sensor.referred = 1, hand->term[0].sensor.reference_type = CAV_OBJECT_XBODY;
   hand->term[0].sensor.reference = body;
   hand->term[0].from = begins * t->time;
-  hand->term[0].to = t->time;
+  const int leaves = t->time >= p->duration && is_wanted_back(p, m->geom[geom].link);
+  hand->term[0].to = leaves ? fmax(leaves_at * t->time, hand->term[0].from + p->timestep) : t->time;
   // a hinge or a slide keeps it from tumbling
   const int still = hand->hung ? 1 : 2;
   const cav_object_type kind = hand->hung ? CAV_OBJECT_BODY : CAV_OBJECT_XBODY;
-  if (hand->found) hand->found = still + 1;
+  if (hand->found) hand->found = still + 1 + leaves;
   hand->term[1] = cav_leading_term(CAV_SENSOR_FRAMEZAXIS, CAV_OBJECT_XBODY, body, hand->upright);
   hand->term[1].to = t->time;
   cav_object_pose(m, state, kind, body, &pose);
   copy3(hand->still, pose.pos);
   hand->term[still] = cav_leading_term(CAV_SENSOR_FRAMEPOS, kind, body, hand->still);
   hand->term[still].to = hand->term[0].from;
+  add3(hand->there, hand->still, t->way);
+  hand->term[still + 1] = cav_leading_term(CAV_SENSOR_FRAMEPOS, kind, body, hand->there);
+  hand->term[still + 1].from = hand->term[0].to, hand->term[still + 1].to = t->time;
 }
 
 /// What has to be touched: what a touch sensor looks at that is to feel a force, and when.
@@ -293,7 +318,7 @@ cav_status cav_hand_find(const cav_problem *problem, double away, cav_hand *hand
   if (!status && t.link) status = cav_position(m, state, problem->q_start);
   if (!status && t.link)
     status = find_geom(m, state, problem->q_start, t.link, state->link[t.link].pos, feels ? touch.sensor : NULL, &geom);
-  if (!status && geom >= 0) lay(m, state, &t, geom, away, hand);
+  if (!status && geom >= 0) lay(problem, state, &t, geom, away, hand);
   meeting one = {.mover = -1};
   if (!status && !hand->found && feels) status = find_meeting(problem, state, &touch, &one);
   if (!status && one.mover >= 0) lay_meeting(m, state, &touch, &one, away, hand);

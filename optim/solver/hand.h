@@ -4,10 +4,10 @@
 
 #include "cavort/solve.h"
 
-enum { CAV_HAND_TERMS = 3 };
+enum { CAV_HAND_TERMS = 4 };
 
 /// Terms that bring a geom of a driven tree to the side of a body that it is to be pushed from, keep a free body from tumbling
-/// towards it, and where it is until then; or one that brings what is to be touched and what touches it together.
+/// towards it, and where it is until then, and where it is to be from when on what pushes it is wanted elsewhere; or one that brings what is to be touched and what touches it together.
 typedef struct cav_hand {
   int found; ///< number of terms; 0: nothing that no actuator moves is asked for elsewhere along the ground, no force is
              ///< asked of a touch sensor, or nothing reaches it
@@ -16,7 +16,7 @@ typedef struct cav_hand {
   cav_term term[CAV_HAND_TERMS]; ///< they borrow what follows
   double place[3];               ///< m, of the geom in the frame of the body
   double upright[3];             ///< z axis of the body at the start
-  double still[3];               ///< m, where it is at the start
+  double still[3], there[3];     ///< m, where it is at the start, and where it is asked for last
 } cav_hand;
 
 /// away: part of its thickness that the hand keeps from the body, 1: it touches, less: it leans on it. CAV_NO_MEMORY, or what
