@@ -158,8 +158,8 @@ static void test_left(int leaves, int follows, double within) {
   cav_problem_free(problem);
 }
 
-/// What the last stages have thrown far off its rows goes back to where these were in, and on by way of softer laws, to nearly the
-/// cost that it has where nothing was thrown. Without that place it ends elsewhere, or nowhere.
+/// What the last stages have thrown far off its rows goes back to where these were in, and on by way of softer laws, to nearly
+/// the cost that it has where nothing was thrown. Without that place it ends elsewhere, or nowhere.
 static void test_lost(void) {
   double cost[3] = {0};
   int softened[3] = {0};

@@ -86,8 +86,8 @@ static void find_place(const cav_model *m, const cav_state *state, const cav_thi
   rotate_back(place, body.rotation, far);
 }
 
-/// Whether a link is wanted elsewhere than at the thing at the end: by its place, or that of what hangs on the world as it does, or
-/// by its joints.
+/// Whether a link is wanted elsewhere than at the thing at the end: by its place, or that of what hangs on the world as it does,
+/// or by its joints.
 static int is_wanted_back(const cav_problem *p, int link) {
   const cav_model *m = p->model;
   const cav_link *root = &m->link[m->link[link].root];

@@ -7,7 +7,8 @@
 enum { CAV_HAND_TERMS = 4 };
 
 /// Terms that bring a geom of a driven tree to the side of a body that it is to be pushed from, keep a free body from tumbling
-/// towards it, and where it is until then, and where it is to be from when on what pushes it is wanted elsewhere; or one that brings what is to be touched and what touches it together.
+/// towards it, and where it is until then, and where it is to be from when on what pushes it is wanted elsewhere; or one that
+/// brings what is to be touched and what touches it together.
 typedef struct cav_hand {
   int found; ///< number of terms; 0: nothing that no actuator moves is asked for elsewhere along the ground, no force is
              ///< asked of a touch sensor, or nothing reaches it

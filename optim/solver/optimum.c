@@ -1,5 +1,7 @@
 /// The end of a solve: from the last stage of the continuation to an optimum at its law, by way of the augmented Lagrangian
 /// and restoration where rows do not come in, and by way of softer laws where steps are stuck.
+#include <math.h>
+
 #include "continuation.h"
 #include "sqp.h"
 
@@ -13,9 +15,10 @@ enum { SOFTENINGS = sizeof softer / sizeof *softer };
 /// Rows farther off than that after the last stage are lost.
 static const double rows_lost = 0.02;
 
-/// Through the law at a fraction of the way, to its optimum nearly, and all stages after it.
-static cav_status soften(cav_solve_run *run, double law, int *left) {
-  int stages = run->problem->schedule.stages, first = 0;
+/// Through the law at a fraction of the way, to its optimum nearly, and all stages after it; to that of the first of these
+/// laws at which rows are no farther off than that.
+static cav_status soften(cav_solve_run *run, double law, double off, int *left) {
+  int stages = run->problem->schedule.stages, first = 0, polished = 0;
   cav_status status = CAV_OK;
   cav_outcome outcome;
   while (first < stages - 1 && first < law * (stages - 1) - 1e-9) first++;
@@ -29,7 +32,9 @@ static cav_status soften(cav_solve_run *run, double law, int *left) {
     status = cav_stage_run(run, fraction, &outcome);
     if (!cav_run_note(run, fraction, begin, outcome)) status = CAV_NO_MEMORY;
     if (status == CAV_OK && outcome == CAV_OUTCOME_STALLED) run->region.radius = 0;
-    if (status == CAV_OK && i == first) status = cav_sqp_on_the_way(run, fraction, left);
+    if (status != CAV_OK || polished || cav_run_rows_off(run) > off) continue;
+    polished = 1;
+    status = cav_sqp_on_the_way(run, fraction, left);
   }
   cav_stage_set(run->problem, 1, run->tr);
   return status;
@@ -41,7 +46,7 @@ static cav_status try_softer(cav_solve_run *run, double law, int *left, int *stu
   double cost = cav_transcription_cost(run->tr);
   cav_trajectory *before = cav_trajectory_copy(run->at);
   if (!before) return CAV_NO_MEMORY;
-  cav_status status = soften(run, law, left);
+  cav_status status = soften(run, law, INFINITY, left);
   if (status == CAV_OK) status = cav_sqp(run, left, stuck);
   if (status != CAV_OK || cav_transcription_cost(run->tr) >= cost) {
     cav_run_exchange(&run->at, &before);
@@ -53,8 +58,8 @@ static cav_status try_softer(cav_solve_run *run, double law, int *left, int *stu
   return status;
 }
 
-/// Where the last stages have lost rows that were in, from there by way of softer laws, the first whose stages keep them; where none
-/// does, from the end of these stages after all.
+/// Where the last stages have lost rows that were in, from there by way of softer laws, the first whose stages keep them; where
+/// none does, from the end of these stages after all.
 static cav_status go_round(cav_solve_run *run, int *left) {
   if (!run->stood) return CAV_OK;
   cav_status status = cav_transcription_values(run->tr, run->at);
@@ -66,7 +71,7 @@ static cav_status go_round(cav_solve_run *run, int *left) {
       run->at = end;
       return CAV_NO_MEMORY;
     }
-    status = soften(run, softer[i], left);
+    status = soften(run, softer[i], rows_lost, left);
     if (status == CAV_OK) status = cav_transcription_values(run->tr, run->at);
     if (status != CAV_OK || cav_run_rows_off(run) <= rows_lost) {
       cav_trajectory_free(end);
