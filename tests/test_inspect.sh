@@ -443,6 +443,33 @@ not_said "note: to lift"
 ask '<sensor name="there" type="framepos" body="crate" component="x" target="1.5" at="end" weight="900"/>'
 not_said "note: to slide"
 
+# a thing slides with the larger friction of two geoms; its own counts where it has priority
+for priority in 0 1; do
+  posture <<TEXT
+<scene><body name="chest" pos="0.42 0 0.35"><freejoint name="chest"/><geom name="chest" type="box" size="0.2 0.3 0.35" mass="25" friction="0.4" priority="$priority"/></body></scene>
+<start key="stand" height="floor"/>
+TEXT
+  ask '<sensor name="there" type="framepos" body="chest" component="y" target="0.35" at="end" weight="900"/><slip body="chest" weight="0" within="any"/>'
+  told="slides on 'floor' with a friction of 0.8: of two geoms that touch the larger counts, not its own 0.4"
+  if [ "$priority" = 0 ]; then says out "note: 'chest' $told"; else not_said "$told"; fi
+done
+
+# a constraint on a joint at the end of its range is where its stop presses; a cost may be there
+cat >crane.xml <<'TEXT'
+<mujoco model="crane"><worldbody><body name="load"><joint name="hoist" type="slide" axis="0 0 1" range="0 2"/><geom size="0.1" mass="4"/></body></worldbody>
+<actuator><motor joint="hoist" ctrlrange="0 90"/></actuator></mujoco>
+TEXT
+for use in constraint cost; do
+  weight=$([ "$use" = constraint ] || echo ' weight="9"')
+  cat >stop.xml <<TEXT
+<problem name="stop" model="crane.xml"><horizon duration="2"/><start/><goal><joint name="hoist" pos="0"/></goal>
+<$use><posture joint="hoist" at="end"$weight/></$use></problem>
+TEXT
+  inspected 0 stop.xml
+  told="a <constraint> has joint 'hoist' at 0 m, 0 from the end of its range, where its stop presses"
+  if [ "$use" = constraint ]; then says out "note: $told"; else not_said "$told"; fi
+done
+
 # --- a guess through a solid; the ground is what every guess is in a little ---
 cat >block.xml <<TEXT
 <problem name="block" model="$root/problems/models/humanoid.xml">

@@ -398,6 +398,66 @@ static int tell_moved(FILE *out, const cav_problem *p) {
   return 1;
 }
 
+/// m, how far apart what rests on something may be from it; times its own friction from which on another one is told.
+static const double resting = 2e-3, larger = 1.2;
+
+/// Of a thing that slides where it rests with a larger friction than that of its own geom: of two that touch the larger counts.
+static int tell_friction(FILE *out, const cav_problem *p) {
+  const cav_model *m = p->model;
+  cav_state *state = cav_state_new(m);
+  cav_thing thing;
+  cav_status status = state ? cav_thing_find(p, 1, state, &thing) : CAV_NO_MEMORY;
+  // contacts are listed that are so far apart
+  if (state) state->options.smoothing = resting;
+  if (!status && thing.link) status = cav_position(m, state, p->q_start);
+  int told = 0;
+  for (int i = 0; !status && thing.link && i < state->ncontact && !told; i++) {
+    const cav_contact *c = &state->contact[i];
+    const cav_pair *pair = &m->pair[c->pair];
+    const int first = c->link1 == thing.link && c->link2 == 0, second = c->link2 == thing.link && c->link1 == 0;
+    if ((!first && !second) || c->dist > resting) continue;
+    const cav_geom *own = &m->geom[first ? pair->geom1 : pair->geom2],
+                   *other = &m->geom[first ? pair->geom2 : pair->geom1];
+    if (!(pair->friction[0] > larger * own->friction[0])) continue;
+    told = 1;
+    fprintf(out,
+            "note: '%.60s' slides on '%.60s' with a friction of %.3g: of two geoms that touch the larger counts, not "
+            "its own "
+            "%.3g, unless it has priority=\"1\"\n",
+            m->body[m->link[thing.link].body].name, other->name && *other->name ? other->name : "the world",
+            pair->friction[0], own->friction[0]);
+  }
+  cav_state_free(state);
+  return told;
+}
+
+/// m or rad from the end of a joint's range in which its stop presses under a planned law.
+static const double near_stop = 5e-3;
+
+/// Of a constraint on the posture of a joint with an actuator that is at the end of its range: the stop presses there.
+static int tell_stop(FILE *out, const cav_problem *p, const cav_term *term) {
+  const cav_model *m = p->model;
+  if (term->quantity != CAV_QUANTITY_CONFIGURATION || term->use != CAV_USE_EQUAL || term->nwaypoint) return 0;
+  const double *q = term->target ? term->target : p->q_goal;
+  for (int j = 0; j < m->njoint; j++) {
+    const cav_joint *joint = &m->joint[j];
+    const int scalar = joint->type == CAV_JOINT_HINGE || joint->type == CAV_JOINT_SLIDE;
+    const int meant =
+        term->dofs == CAV_DOFS_ALL || term->dofs == CAV_DOFS_JOINTS || (term->dofs == CAV_DOFS_ONE && term->joint == j);
+    if (!scalar || !meant || !joint->limited || !joint->driven) continue;
+    const double at = q[joint->q], off = fmin(at - joint->range[0], joint->range[1] - at);
+    if (!(off >= 0 && off < near_stop)) continue;
+    const char *unit = joint->type == CAV_JOINT_SLIDE ? "m" : "rad";
+    fprintf(out,
+            "note: a <constraint> has joint '%.60s' at %.4g %s, %.2g from the end of its range, where its stop presses "
+            "and plans "
+            "keep %g clear: ask for it %g %s off the end, or by a cost\n",
+            joint->name ? joint->name : "", at, unit, off, p->limit_margin, near_stop, unit);
+    return 1;
+  }
+  return 0;
+}
+
 /// Parts of a step that a time may be off its knot untold.
 static const double at_knot = 0.05;
 
@@ -434,7 +494,7 @@ int cav_command_tell_units(FILE *out, const cav_problem *p) {
   for (int i = 0; i < p->nterm; i++) {
     const cav_term *term = &p->term[i];
     n += tell_degrees(out, p, term) + tell_millimetres(out, p, term) + tell_touch(out, p, term) +
-         tell_between(out, p, term) + tell_things(out, p, term);
+         tell_between(out, p, term) + tell_things(out, p, term) + tell_stop(out, p, term);
   }
-  return n + tell_moved(out, p);
+  return n + tell_moved(out, p) + tell_friction(out, p);
 }

@@ -134,6 +134,9 @@ static void print_targets(FILE *out, const cav_problem *problem, const cav_term_
   if (shown < all) fprintf(out, "  and %d more in terms.csv\n", all - shown);
 }
 
+// force without an actuator, fraction of the weight, from which on what is achieved is so by it
+static const double nowhere = 0.05;
+
 // end errors of a closed loop, m, and effort that it asks for over what there is, from which a certificate is told to be narrow
 static const double at_the_edge = CAV_LOST_DISTANCE / 2, overasked = 6;
 
@@ -183,11 +186,13 @@ void cav_certificate_print(FILE *out, const cav_problem *problem, const cav_verd
   if (!isnan(v->residual_fraction_max))
     fprintf(out, ", with residual forces on its root of up to %.3g %% of the weight", 100 * v->residual_fraction_max);
   // both words in the line that is looked for
+  const int levitates = v->unactuated_force_max > nowhere;
   fprintf(out, v->achieved ? "; achieved%s\n" : "; NOT achieved%s\n",
-          !v->achieved    ? ""
-          : !v->ntarget   ? " (nothing had to be met)"
-          : !v->certified ? ", by a motion that does not hold"
-                          : "");
+          !v->achieved   ? ""
+          : !v->ntarget  ? " (nothing had to be met)"
+          : v->certified ? ""
+          : levitates    ? ", by forces that nothing exerts"
+                         : ", by a motion that does not hold");
   int missed = 0;
   for (int i = 0; i < n; i++) missed += line[i].passed == 0;
   if (!v->certified) fprintf(out, "  %s\n", v->reason);
