@@ -530,8 +530,8 @@ static int find_near(const cav_race *race, int i, const char *passed) {
 // whether two strategies are the same: of one guess with the same changes
 static int is_same(const cav_strategy *a, const cav_strategy *b) {
   return a->left == b->left && a->stated == b->stated && a->guess == b->guess && a->nswing == b->nswing &&
-         a->nreach == b->nreach && a->met == b->met && a->flies == b->flies && a->height == b->height && a->bow[0] == b->bow[0] &&
-         a->bow[1] == b->bow[1] && !strcmp(a->changed, b->changed);
+         a->nreach == b->nreach && a->met == b->met && a->flies == b->flies && a->height == b->height &&
+         a->bow[0] == b->bow[0] && a->bow[1] == b->bow[1] && !strcmp(a->changed, b->changed);
 }
 
 // the strategy that repairs a motion by a cure that was not tried, nor led to this motion without making it better; to be
