@@ -61,26 +61,28 @@ static cav_status try_softer(cav_solve_run *run, double law, int *left, int *stu
 /// Where the last stages have lost rows that were in, from there by way of softer laws, the first whose stages keep them; where
 /// none does, from the end of these stages after all.
 static cav_status go_round(cav_solve_run *run, int *left) {
-  if (!run->stood) return CAV_OK;
-  cav_status status = cav_transcription_values(run->tr, run->at);
-  if (status != CAV_OK || cav_run_rows_off(run) <= rows_lost) return status;
-  cav_trajectory *end = run->at;
-  for (int i = 0; i < SOFTENINGS && status == CAV_OK; i++) {
-    run->at = cav_trajectory_copy(run->stood);
-    if (!run->at) {
-      run->at = end;
-      return CAV_NO_MEMORY;
-    }
-    status = soften(run, softer[i], rows_lost, left);
+  cav_trajectory *stood = run->stood, *end = run->at;
+  // once, whatever becomes of it
+  run->stood = NULL;
+  cav_status status = stood ? cav_transcription_values(run->tr, end) : CAV_OK;
+  int found = !stood || status != CAV_OK || cav_run_rows_off(run) <= rows_lost;
+  for (int i = 0; i < SOFTENINGS && !found; i++) {
+    int rest = *left;
+    if (run->at != end) cav_trajectory_free(run->at);
+    run->at = cav_trajectory_copy(stood);
+    status = run->at ? soften(run, softer[i], rows_lost, &rest) : CAV_NO_MEMORY;
     if (status == CAV_OK) status = cav_transcription_values(run->tr, run->at);
-    if (status != CAV_OK || cav_run_rows_off(run) <= rows_lost) {
-      cav_trajectory_free(end);
-      return status;
-    }
-    cav_trajectory_free(run->at);
+    found = status != CAV_OK || cav_run_rows_off(run) <= rows_lost;
+    if (found) *left = rest;
   }
+  cav_trajectory_free(stood);
+  if (found && run->at) {
+    if (run->at != end) cav_trajectory_free(end);
+    return status;
+  }
+  if (run->at) cav_trajectory_free(run->at);
   run->at = end;
-  return cav_transcription_values(run->tr, run->at);
+  return status == CAV_OK ? cav_transcription_values(run->tr, end) : status;
 }
 
 /// The last phase, and where its steps are stuck once more by way of softer laws, unless it is all that there is. What is

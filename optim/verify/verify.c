@@ -273,6 +273,9 @@ static void require(cav_verdict *verdict, const cav_metric *metric, double limit
            metric->where, help);
 }
 
+/// Unactuated force, fraction of the weight, from which on a motion is not nearly one.
+static const double astray = 0.5;
+
 // the conditions in order
 static void decide(const cav_verification *verification, const metrics *found, const cav_replay *replay,
                    cav_verdict *verdict) {
@@ -281,7 +284,11 @@ static void decide(const cav_verification *verification, const metrics *found, c
     snprintf(verdict->reason, sizeof verdict->reason, "the claimed contact law leaves out the model's %s", missing);
   }
   require(verdict, &found->unactuated, CAV_TOLERANCE_UNACTUATED, "unactuated force, fraction of weight,",
-          "More iterations, a longer motion or a start nearer to balance usually help.");
+          found->unactuated.value > astray
+              ? "The solve went astray, and what its forces are means little: <waypoint>s on the way, or parts of it "
+                "one by "
+                "one, usually help."
+              : "More iterations, a longer motion or a start nearer to balance usually help.");
   require(verdict, &found->mirrored, CAV_TOLERANCE_MIRRORED,
           "unactuated force in the mirrored half stride, fraction of weight, or of a limit beyond it,",
           "The model is not enough its own mirror image: a whole stride, without mirror, needs no such image.");
