@@ -179,7 +179,7 @@ static void find_sides(const hands *h, const cav_pose *body, double away, double
   }
 }
 
-/// The geom of the thing that comes farthest out along n: a handle, where it has one.
+/// The geom of the thing that comes farthest out along n: a handle, where it has one; -1: it touches by listed pairs alone.
 static int outermost(const hands *h, const double n[3]) {
   int best = -1;
   double most = -INFINITY;
@@ -204,6 +204,10 @@ static void find_back(const hands *h, double away, double place[2][3]) {
   const double edge = cav_thing_surface(h->m, h->state, h->thing.link, ahead, centre, &none);
   const int g = outermost(h, n);
   cav_pose back;
+  if (g < 0) {
+    for (int k = 0; k < 2; k++) set3(place[k], NAN, NAN, NAN);
+    return;
+  }
   cav_object_pose(h->m, h->state, CAV_OBJECT_GEOM, g, &back);
   const double width = cav_geom_exit(h->m, g, &back, across), bottom = cav_geom_bottom(h->m, g, &back),
                top = back.pos[2] + cav_geom_exit(h->m, g, &back, up);
