@@ -291,6 +291,7 @@ static void test_refusals(const cav_problem *p, const char *folder) {
                 {"q,1,", "q,2,"},
                 {"\nend", ""},
                 {"radius,", "radius,x"},
+                {"stood,", "stood,x"},
                 {"knots,", "knots,1"},
                 {"multiplier,0,", "multiplier,0,nan,"},
                 {"fraction,0", "fraction,2"}};

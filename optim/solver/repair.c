@@ -73,7 +73,7 @@ static const cure *cures_of(const cav_problem *p, const cav_verdict *v) {
                     near[] = {STEP, SLACK, NONE}, again[] = {STEP, SLIDING, NONE}, off_slip[] = {OFF, SMOOTHING, SLIP},
                     off_hover[] = {OFF, GAP, SMOOTHING}, ground[] = {STEP, LOOSE, SOFTER}, none[] = {NONE},
                     finer[] = {STEP, SMOOTHING, NONE}, lower[] = {SMOOTHING, STEP, GAP};
-  // what follows from its start is off by its steps, and hovers at rest by twelve of its smoothings and more
+  // what follows from its start is off by its steps, and hovers at rest by several of its smoothings (METHOD.md, 7)
   const int given = cav_problem_is_given(p);
   const cure *aims = v->achieved                                                ? none
                      : given                                                    ? finer
