@@ -101,6 +101,9 @@ int cav_run_within_limits(const cav_solve_run *run);
 /// dynamics says of start and goal.
 cav_status cav_guess_fill(const cav_problem *problem, const double *end, cav_trajectory *at);
 
+/// Whether a problem has postures, an arc, a bow, a turn or swings on the way of its guess.
+int cav_guess_is_decorated(const cav_problem *problem);
+
 /// Law of the last stage at the problem's step.
 cav_options cav_last_law(const cav_problem *problem);
 

@@ -233,3 +233,10 @@ cav_status cav_guess_take(cav_solve_run *run) {
   free(x);
   return status;
 }
+
+int cav_guess_is_decorated(const cav_problem *problem) {
+  int decorated = problem->guess_bow[0] != 0 || problem->guess_bow[1] != 0 || problem->guess_height != 0 ||
+                  problem->nguess_pose || problem->nswing;
+  for (int k = 0; k < 3; k++) decorated |= problem->guess_rotation[k] != 0;
+  return decorated;
+}
